@@ -1,0 +1,161 @@
+"""The moving air: a sum of parts, each giving the velocity of the air in R at the aircraft.
+
+Signs      parts answer in R: x along the landing direction, y right, z DOWN. In the settings `headwind` is positive on
+           the nose (-x); `crosswind` and `lateral` are positive blowing towards +y (to the right, from the left);
+           `vertical` is positive blowing UP (-z), as height is.
+A further kind of wind (shear, 1-cosine gust, microburst) is one more part: a frozen dataclass with `velocity` if it
+depends on place and time only, a small class made from one if it remembers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
+from typing import Protocol
+
+import numpy as np
+
+from landing_sim.noise import NoiseStream
+from landing_sim.types import Array
+from landing_sim.world.dryden import DrydenTurbulence, Turbulence
+
+
+class WindPart(Protocol):
+    """One contribution to the wind."""
+
+    def velocity(self, t: float, x: float, height: float, airspeed: float) -> tuple[float, float, float]:
+        """Velocity of the air in R [m/s]; t [s], x and height [m] of the cg in R, true airspeed [m/s]."""
+
+
+def _check_finite(part: str, values: Sequence[float]) -> None:
+    if not all(math.isfinite(value) for value in values):
+        raise ValueError(f"{part}: every value must be a finite number, got {tuple(values)}")
+
+
+@dataclass(frozen=True, slots=True)
+class SteadyWind:
+    """The same everywhere and always [m/s]."""
+
+    headwind: float = 0.0
+    crosswind: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_finite("steady wind", astuple(self))
+
+    def velocity(self, t: float, x: float, height: float, airspeed: float) -> tuple[float, float, float]:
+        return -self.headwind, self.crosswind, 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class CrosswindStep:
+    """A crosswind that blows beyond x = at_x only, risen as half a cosine over the distance `over` [m]; 0 is a step.
+
+    Source     Dickmanns & Schell 1992, section 7.1: -1 m/s from 800 m before the threshold.
+    """
+
+    at_x: float = -800.0
+    crosswind: float = -1.0
+    over: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_finite("crosswind step", astuple(self))
+        if self.over < 0.0:
+            raise ValueError(f"crosswind step: 'over' is the distance of the rise in m and cannot be {self.over}")
+
+    def velocity(self, t: float, x: float, height: float, airspeed: float) -> tuple[float, float, float]:
+        inside = x - self.at_x
+        if inside <= 0.0:
+            return 0.0, 0.0, 0.0
+        if inside >= self.over:
+            return 0.0, self.crosswind, 0.0
+        return 0.0, 0.5 * self.crosswind * (1.0 - math.cos(math.pi * inside / self.over)), 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class ExponentialGust:
+    """A gust met when x first passes at_x, decaying in time as exp(-t / tau); who starts beyond it meets it at once.
+
+    Source     Dickmanns & Schell 1992, section 7.1: 650 m before the threshold, 2 m/s lateral, 1 m/s vertical, 6 s.
+               The paper gives no signs. Lateral with the sign of its crosswind reproduces its 2 deg of crab at
+               200 m before the threshold; vertical is taken as an updraught.
+    """
+
+    at_x: float = -650.0
+    lateral: float = -2.0
+    vertical: float = 1.0
+    tau: float = 6.0
+
+    def __post_init__(self) -> None:
+        _check_finite("gust", astuple(self))
+        if self.tau <= 0.0:
+            raise ValueError(f"gust: the decay time tau must be > 0 s, not {self.tau}")
+
+
+class _MetGust:
+    """An ExponentialGust that remembers when it was met."""
+
+    __slots__ = ("_gust", "_t_met")
+
+    def __init__(self, gust: ExponentialGust) -> None:
+        self._gust = gust
+        self._t_met = math.nan
+
+    def velocity(self, t: float, x: float, height: float, airspeed: float) -> tuple[float, float, float]:
+        gust = self._gust
+        if math.isnan(self._t_met):
+            if x <= gust.at_x:
+                return 0.0, 0.0, 0.0
+            self._t_met = t
+        decay = math.exp((self._t_met - t) / gust.tau)
+        return 0.0, gust.lateral * decay, -gust.vertical * decay
+
+
+@dataclass(frozen=True, slots=True)
+class WindConfig:
+    """What blows; a part that is None does not."""
+
+    steady: SteadyWind = SteadyWind()
+    step: CrosswindStep | None = None
+    gust: ExponentialGust | None = None
+    turbulence: Turbulence | None = None
+
+
+class Wind:
+    """interfaces.World: the sum of what a WindConfig names. One per run, since gusts and turbulence remember.
+
+    Parameters
+    ----------
+    config : what blows
+    noise : stream of the turbulence; needed with turbulence only
+
+    Raises ValueError for turbulence without a noise stream.
+    """
+
+    __slots__ = ("_velocities",)
+
+    def __init__(self, config: WindConfig, noise: NoiseStream | None = None) -> None:
+        parts: list[WindPart] = [config.steady]
+        if config.step is not None:
+            parts.append(config.step)
+        if config.gust is not None:
+            parts.append(_MetGust(config.gust))
+        if config.turbulence is not None:
+            if noise is None:
+                raise ValueError("wind: turbulence needs a noise stream, e.g. Noise(seed, 'turbulence', run)")
+            parts.append(DrydenTurbulence(config.turbulence, noise))
+        self._velocities = tuple(part.velocity for part in parts)
+
+    def wind(self, t: float, x: float, height: float, airspeed: float) -> Array:
+        """(3,) [m/s] velocity of the air in R at the aircraft, a new array each call."""
+        wx = wy = wz = 0.0
+        for velocity in self._velocities:
+            a, b, c = velocity(t, x, height, airspeed)
+            wx += a
+            wy += b
+            wz += c
+        wind_R = np.empty(3)
+        wind_R[0] = wx
+        wind_R[1] = wy
+        wind_R[2] = wz
+        return wind_R
