@@ -172,7 +172,7 @@ class Measurement:
 
     kinds      "edges": z (n,) px, R (n,) variances, geometry an EdgeSet
                "pose": z (6,) x, y, H of the camera, phi, theta, psi of the body; R (6, 6): acquisition
-               "gyro": z (3,) rad/s, R (3,); "airspeed": z (1,) m/s, R (1,)
+               "gyro": z (3,) rad/s, R (3,); "airspeed": z (1,) m/s, R (1,); "on_ground": z (1,) 0 or 1
     """
 
     kind: str
@@ -181,6 +181,16 @@ class Measurement:
     z: Array
     R: Array
     geometry: EdgeSet | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Residuals:
+    """What the estimator made of its last "edges" measurement."""
+
+    innovation: Array  # (n,) [px] z - h(x-); NaN where nothing was measured
+    status: np.ndarray  # (n,) int64 Status, with the gate's REJECTED
+    nis: float  # normalised innovation squared of what was used
+    dof: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,7 +206,8 @@ class Estimate:
     mean: Array  # (n,)
     cov: Array | None  # (n, n)
     valid: bool
-    flags: Mapping[str, bool] = field(default_factory=dict)  # e.g. threshold_in_view, lost, reinflated
+    flags: Mapping[str, bool] = field(default_factory=dict)  # threshold_in_view, on_ground, lost, reinflated
+    residuals: Residuals | None = None  # None when no image was processed since the last reading
 
     def __getitem__(self, name: str) -> float:
         return float(self.mean[self.names.index(name)])
