@@ -21,7 +21,6 @@ from landing_sim.yamlfile import Section, inconsistent
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Grey = Annotated[float, Field(ge=0, le=255)]
-Range = tuple[float, float]
 
 
 class Time(Section):
@@ -173,7 +172,7 @@ class Vision(Section):
     windows: str = Field(
         "3L3R2T2H",
         pattern=r"^[0-9]L[0-9]R[0-9]T[0-9]H$",
-        description="windows on left and right borderline, threshold, horizon; a lost threshold's go to the borderlines",
+        description="windows on left, right borderline, threshold, horizon; a lost threshold's move to the borderlines",
     )
     platform_angle: Literal["encoder", "commanded"] = Field("encoder", description="which platform angles are believed")
 
@@ -220,31 +219,52 @@ class Record(Section):
     frames_hz: NotNegative = Field(5.0, description="camera images in the recording, per second; 0 = none")
 
 
-class Criteria(Section):
-    """What makes a landing pass. null = not judged. Errors are estimate minus truth from 1.5 s after acquisition."""
+Metric = Literal[
+    "range_m",
+    "range_far_percent",
+    "height_approach_m",
+    "height_runway_m",
+    "lateral_m",
+    "roll_deg",
+    "pitch_deg",
+    "yaw_deg",
+    "airspeed_mps",
+    "speed_forward_mps",
+    "wind_along_mps",
+    "wind_across_mps",
+    "wind_down_mps",
+    "width_m",
+    "captured_after_m",
+    "peak_roll_deg",
+    "touchdown_x_m",
+    "touchdown_y_m",
+    "sink_rate_mps",
+    "touchdown_airspeed_mps",
+    "touchdown_bank_deg",
+    "rollout_y_m",
+    "final_groundspeed_mps",
+    "threshold_lost_m",
+    "nees",
+    "nis",
+]
 
-    touchdown_x_m: Range | None = Field((250.0, 900.0), description="first main wheel, from the threshold")
-    touchdown_y_m: Positive | None = Field(3.0, description="first main wheel, off the centreline")
-    sink_rate_mps: Positive | None = Field(1.5, description="of that wheel")
-    touchdown_airspeed_mps: Range | None = Field(None, description="at touchdown")
-    stops_on_runway: bool = Field(True, description="comes below 10 m/s on the surface")
-    peak_roll_deg: Positive | None = Field(None, description="largest bank before touchdown")
-    capture_m: Range | None = Field(None, description="[distance travelled, |y| must be below]")
-    range_error_m: Positive | None = Field(None, description="while the threshold is in view")
-    range_error_percent: Positive | None = Field(2.0, description="of range, where that is more, beyond 500 m")
-    height_error_m: Positive | None = Field(None, description="before the threshold")
-    height_error_over_runway_m: Positive | None = Field(None, description="over the runway, until touchdown")
-    lateral_error_m: Positive | None = Field(None, description="until touchdown")
-    roll_error_deg: Positive | None = Field(None, description="until touchdown")
-    yaw_error_deg: Positive | None = Field(None, description="until touchdown")
 
-    @model_validator(mode="after")
-    def _ordered(self) -> Criteria:
-        for name in ("touchdown_x_m", "touchdown_airspeed_mps"):
-            limits = getattr(self, name)
-            if limits and limits[0] >= limits[1]:
-                inconsistent([(("criteria", name), "must be [lowest, highest]")])
-        return self
+class Criterion(Section):
+    """Bounds of one figure of the flight. Errors are the largest |estimate - truth| from 1.5 s after acquisition."""
+
+    metric: Metric = Field(description="what is judged; range is judged in metres within 500 m and in percent beyond")
+    low: float | None = Field(None, description="lowest value that passes")
+    high: float | None = Field(None, description="highest value that passes")
+    source: str = Field("", max_length=200, description="where the limit comes from")
+
+
+LANDING = (
+    Criterion(metric="touchdown_x_m", low=250.0, high=900.0, source="a safe landing"),
+    Criterion(metric="touchdown_y_m", low=-3.0, high=3.0, source="a safe landing"),
+    Criterion(metric="sink_rate_mps", high=1.5, source="a safe landing"),
+    Criterion(metric="final_groundspeed_mps", high=10.0, source="a safe landing"),
+)
+"""What a landing in any weather must meet."""
 
 
 class Scenario(Section):
@@ -267,7 +287,9 @@ class Scenario(Section):
     believed: Believed = Field(Believed(), description="onboard models against the truth")
     control: Control = Field(Control(), description="controller")
     record: Record = Field(Record(), description="outputs")
-    criteria: Criteria = Field(Criteria(), description="what makes it pass")
+    criteria: tuple[Criterion, ...] = Field(
+        LANDING, max_length=100, description="what makes it pass; a safe landing if left out"
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> Scenario:
@@ -288,6 +310,11 @@ class Scenario(Section):
         for i, taxiway in enumerate(self.runway.taxiways):
             if not 0 <= taxiway.x_m <= length:
                 problems.append((("runway", "taxiways", i, "x_m"), f"lies off the runway (0 ... {length:g})"))
+        for i, limit in enumerate(self.criteria):
+            if limit.low is None and limit.high is None:
+                problems.append((("criteria", i), "needs low, high or both"))
+            elif limit.low is not None and limit.high is not None and limit.low > limit.high:
+                problems.append((("criteria", i, "low"), f"is above high = {limit.high:g}"))
         inconsistent(problems)
         return self
 
