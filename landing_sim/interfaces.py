@@ -73,7 +73,8 @@ class Estimator(Protocol):
 
     def update(self, memory: Any, measurement: Measurement) -> Any: ...
 
-    def read(self, memory: Any) -> Estimate: ...
+    def read(self, memory: Any, t: float | None = None) -> Estimate:
+        """The estimate now, or as it was at an earlier time t if the estimator keeps its past."""
 
 
 class Guidance(Protocol):

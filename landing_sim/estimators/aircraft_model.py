@@ -167,7 +167,7 @@ def dynamics(x: Array, s: Array, par: Array, f: Array, A: Array, jacobian: bool)
     Clr = par[_CLR0] + par[_CLRL] * CLw
     Cl = par[_CLB] * beta + par[_CLDA] * da + par[_CLDR] * dr + b2V * (par[_CLP] * p + Clr * r)
     # pitch is normalised by 1 m here: chord and arms inside
-    Cm = (par[_XAC] * CLw - par[_LT] * CLt + par[_C] * (par[_CM0] + par[_CMF] * flap + par[_CMQ] * q * c2V))
+    Cm = par[_XAC] * CLw - par[_LT] * CLt + par[_C] * (par[_CM0] + par[_CMF] * flap + par[_CMQ] * q * c2V)
     Cnp = par[_CNP0] + par[_CNPL] * CLw
     Cn = par[_CNB] * beta + par[_CNDR] * dr + par[_CNDAL] * CLw * da + b2V * (Cnp * p + par[_CNR] * r)
 
@@ -220,7 +220,7 @@ def dynamics(x: Array, s: Array, par: Array, f: Array, A: Array, jacobian: bool)
         dCY = par[_CYB] * dbe + par[_CYP] * dp_ + par[_CYR] * dr_n
         dCl = par[_CLB] * dbe + par[_CLP] * dp_ + Clr * dr_n + par[_CLRL] * dCLw * b2V * r
         dCm = par[_XAC] * dCLw - par[_LT] * dCLt + par[_C] * par[_CMQ] * c2V * (dq - q * dV_V)
-        dCn = (par[_CNB] * dbe + Cnp * dp_ + par[_CNR] * dr_n + dCLw * (par[_CNDAL] * da + par[_CNPL] * b2V * p))
+        dCn = par[_CNB] * dbe + Cnp * dp_ + par[_CNR] * dr_n + dCLw * (par[_CNDAL] * da + par[_CNPL] * b2V * p)
         d[0, i] = qS / m * (dCX + 2.0 * CX * dV_V)
         d[1, i] = qS / m * (dCY + 2.0 * CY * dV_V)
         d[2, i] = qS / m * (dCZ + 2.0 * CZ * dV_V)

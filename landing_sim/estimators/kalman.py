@@ -210,3 +210,36 @@ def update_ud(
             for j in range(starts[b], starts[b + 1]):
                 dx[j] += k_gain[j] * e / s
     return U, D, dx, nis
+
+
+@kernel
+def integrated_noise(Phi: Array, q: Array, dt: float, starts: Array) -> Array:
+    """Qd (n, n) of white noise with densities q (n,): the integral in eq. (9) by the trapezium rule,
+
+    Qd = (Phi q Phi' + q) dt / 2, within each block.
+    """
+    n = q.shape[0]
+    out = np.zeros((n, n))
+    for b in range(starts.shape[0] - 1):
+        for i in range(starts[b], starts[b + 1]):
+            for j in range(i, starts[b + 1]):
+                acc = q[i] if i == j else 0.0
+                for k in range(starts[b], starts[b + 1]):
+                    acc += Phi[i, k] * q[k] * Phi[j, k]
+                out[i, j] = 0.5 * dt * acc
+                out[j, i] = out[i, j]
+    return out
+
+
+@kernel
+def expand(Phi15: Array, index: Array) -> Array:
+    """Transition of the covered states (n, n) from that of aircraft and wind (15, 15); all others stay what they are."""
+    n = index.shape[0]
+    out = np.zeros((n, n))
+    for i in range(n):
+        out[i, i] = 1.0
+        if index[i] < 15:
+            for j in range(n):
+                if index[j] < 15:
+                    out[i, j] = Phi15[index[i], index[j]]
+    return out

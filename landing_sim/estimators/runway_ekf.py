@@ -1,0 +1,356 @@
+"""The 4D-approach filter: an extended Kalman filter on the aircraft's motion, fed with edges of the runway's image.
+
+One code base for the plain twelve-state filter of the paper, its split into longitudinal and lateral halves, the
+augmented filter (wind, gyro and encoder bias) and the runway's width, as a state or as a second filter beside: they
+differ in which states are covered (`Blocks`) and how the covariance is carried (dense or U-D).
+
+Source     Dickmanns & Schell 1992, sections 2-4 and 7.1; Bierman 1977. Departs: see kalman.py, aircraft_model.py,
+           edge_model.py; a robust start, a gate and a watchdog are added.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from landing_sim.estimators import kalman, states
+from landing_sim.estimators.aircraft_model import AircraftBelief, downwash, propagate, thrust
+from landing_sim.estimators.edge_model import edge_model
+from landing_sim.estimators.inertial_model import airspeed_model, gyro_model
+from landing_sim.geometry.pinhole import Intrinsics
+from landing_sim.signals import Command, EdgeSet, Estimate, Feature, Measurement, Residuals, Status
+from landing_sim.types import Array
+
+RAD = math.pi / 180.0
+
+
+@dataclass(frozen=True, slots=True)
+class FilterConfig:
+    """Which filter, and its noise. Spectral densities are square roots, per sqrt(Hz)."""
+
+    kind: Literal["augmented", "plain", "split"] = "augmented"
+    factorisation: Literal["dense", "ud"] = "dense"
+    width: Literal["known", "state", "separate"] = "known"
+    process_noise: Literal["integrated", "constant"] = "integrated"  # eq. (9), or the constant Q of eqs. (13)-(14)
+    gate_sigma: float | None = 4.0
+    gyro_sigma: float = 0.1 * RAD  # [rad/s]
+    airspeed_sigma: float = 0.5  # [m/s]
+    encoder_sigma: float = 0.03 * RAD  # [rad] prior of the platform's encoder bias
+    gyro_bias_sigma: float = 0.1 * RAD
+    width_sigma: float = 4.0  # [m] prior, where width is estimated
+    wind_sigma: tuple[float, float, float] = (3.0, 3.0, 1.0)  # [m/s] prior
+    q_velocity: float = 0.15  # [m/s^2]
+    q_rates: tuple[float, float, float] = (1.5 * RAD, 1.0 * RAD, 1.0 * RAD)  # [rad/s^2]
+    q_attitude: float = 0.02 * RAD
+    q_position: float = 0.02
+    q_wind: tuple[float, float, float] = (0.05, 0.6, 0.5)
+    q_width: float = 0.0
+    q_ground_velocity: float = 2.0  # on the wheels
+    q_ground_rates: float = 6.0 * RAD
+    start_frames: int = 8  # iterated, robust, ungated
+    start_iterations: int = 4
+    huber: float = 2.0
+    watchdog_share: float = 0.35  # smoothed share of rejected edges that means "locked out"
+    watchdog_memory: float = 5.0  # frames
+    lost_after: int = 30  # frames without edges
+    approach_angle: float = -3.0 * RAD  # believed flight path while nothing is known
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """All that the filter remembers; never changed in place."""
+
+    t: float
+    valid: bool
+    x: Array  # (21,)
+    shadow: Array  # (6,) believed actuators, flap, thrust, delayed downwash
+    P: Array  # (n, n) covariance, or U where D is given
+    D: Array | None
+    airspeed: float = 50.0  # last readings, for the start
+    gyro: Array = field(default_factory=lambda: np.zeros(3))
+    frames: int = 0  # images since the start (or since the watchdog's last re-inflation)
+    misses: int = 0  # images in a row without an edge
+    rejected: float = 0.0  # smoothed share
+    on_ground: bool = False
+    threshold_in_view: bool = False
+    reinflated: int = 0
+    residuals: Residuals | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Blocks:
+    """Which states a filter covers, in covariance order, and where each block starts."""
+
+    index: np.ndarray  # (n,) state of each covariance row
+    starts: np.ndarray
+
+    @staticmethod
+    def of(config: FilterConfig) -> Blocks:
+        groups: list[tuple[int, ...]]
+        if config.kind == "split":
+            groups = [states.LONGITUDINAL, states.LATERAL]
+        elif config.kind == "plain":
+            groups = [states.PAPER]
+        else:
+            wind: tuple[int, ...] = states.WIND
+            if config.width != "known":
+                wind = wind[1:]  # along-track wind and width scale the scene alike: not both
+            groups = [states.PAPER + wind + states.GYRO_BIAS + states.ENCODER_BIAS]
+        if config.width == "state":
+            groups[0] += (states.WIDTH,)
+        elif config.width == "separate":
+            groups.append((states.WIDTH,))
+        bounds = np.cumsum([0] + [len(g) for g in groups])
+        return Blocks(np.array(sum(groups, ()), dtype=np.int64), bounds.astype(np.int64))
+
+
+class RunwayEkf:
+    """The estimator (interfaces.Estimator): constants only, memory in, memory out.
+
+    Parameters
+    ----------
+    belief : the aircraft as believed
+    camera, lever : believed intrinsics [px] and camera place in body axes (3,) [m]
+    width, slope : believed runway width [m] and slope [rad]
+    """
+
+    def __init__(
+        self, config: FilterConfig, belief: AircraftBelief, camera: Intrinsics, lever: Array, width: float, slope: float
+    ) -> None:
+        self.config = config
+        self.blocks = Blocks.of(config)
+        self.names = tuple(states.NAMES[i] for i in self.blocks.index)
+        self._par = belief.vector()
+        self._focal = np.array([camera.f, camera.cx, camera.cy])
+        self._lever = np.asarray(lever, dtype=float)
+        self._width, self._slope = width, slope
+        q = np.zeros(states.N)
+        q[:3] = config.q_velocity**2
+        q[3:6] = np.square(config.q_rates)
+        q[6:9] = config.q_attitude**2
+        q[9:12] = config.q_position**2
+        q[12:15] = np.square(config.q_wind)
+        q[states.WIDTH] = config.q_width**2
+        ground = q.copy()
+        ground[:3] = config.q_ground_velocity**2
+        ground[3:6] = config.q_ground_rates**2
+        self._q_air, self._q_ground = q[self.blocks.index], ground[self.blocks.index]
+        self._prior = self._prior_variance()
+        self._constant_Q: dict[tuple[bool, int], Array] = {}
+
+    # ------------------------------------------------------------------------------------------- interface
+
+    def init(self, t: float) -> Memory:
+        x = np.zeros(states.N)
+        x[states.WIDTH] = self._width
+        n = len(self.names)
+        return Memory(t, False, x, np.zeros(6), np.zeros((n, n)), None)
+
+    def predict(self, memory: Memory, command: Command, t: float) -> Memory:
+        """To time t under `command` (eqs. 8, 9). Before the start only time passes."""
+        dt = t - memory.t
+        if dt <= 0.0:
+            return memory
+        u = np.array([command.elevator, command.aileron, command.rudder, command.throttle, command.flap])
+        if not memory.valid:
+            steady = thrust(command.throttle, memory.airspeed, self._par)
+            return replace(memory, t=t, shadow=np.array([*u[:3], command.flap, steady, 0.0]), residuals=None)
+        x, shadow = memory.x.copy(), memory.shadow.copy()
+        Phi15 = np.empty((15, 15))
+        propagate(x, shadow, u, self._par, memory.on_ground, dt, Phi15)
+        Phi = kalman.expand(Phi15, self.blocks.index)
+        Qd = self._process_noise(Phi, dt, memory.on_ground)
+        P, D = memory.P, memory.D
+        if D is None:
+            P = kalman.predict_dense(P, Phi, Qd, self.blocks.starts)
+        else:
+            P, D = kalman.predict_ud(P, D, Phi, Qd, self.blocks.starts)
+        return replace(memory, t=t, x=x, shadow=shadow, P=P, D=D, residuals=None)
+
+    def update(self, memory: Memory, measurement: Measurement) -> Memory:
+        """Take in one measurement at the memory's time (eqs. 10-12)."""
+        match measurement.kind:
+            case "edges":
+                return self._edges(memory, measurement) if memory.valid else memory
+            case "gyro":
+                memory = replace(memory, gyro=measurement.z)
+                if not memory.valid:
+                    return memory
+                nu, Hx = gyro_model(memory.x, measurement.z)
+                return self._scalars(memory, Hx, measurement.R, nu)
+            case "airspeed":
+                memory = replace(memory, airspeed=float(measurement.z[0]))
+                if not memory.valid:
+                    return memory
+                nu, Hx = airspeed_model(memory.x, measurement.z[0])
+                return self._scalars(memory, Hx, measurement.R, nu)
+            case "on_ground":
+                return replace(memory, on_ground=bool(measurement.z[0] > 0.5))
+            case "pose":
+                return self._start(memory, measurement)
+        raise ValueError(f"the runway filter does not know measurements of kind {measurement.kind!r}")
+
+    def read(self, memory: Memory, t: float | None = None) -> Estimate:
+        """The estimate at the memory's time; an age `t` asked for is ignored (see Rewind)."""
+        flags = {
+            "threshold_in_view": memory.threshold_in_view,
+            "on_ground": memory.on_ground,
+            "lost": memory.misses >= self.config.lost_after,
+            "reinflated": memory.reinflated > 0,
+        }
+        cov = None
+        if memory.valid:
+            cov = memory.P if memory.D is None else kalman.ud_product(memory.P, memory.D)
+        return Estimate(memory.t, self.names, memory.x[self.blocks.index], cov, memory.valid, flags, memory.residuals)
+
+    # ------------------------------------------------------------------------------------------- start
+
+    def _prior_variance(self) -> Array:
+        c = self.config
+        sd = np.zeros(states.N)
+        sd[:3] = (2.0, 3.0, 2.0)
+        sd[3:6] = 2.0 * RAD
+        sd[6:9] = (2.0 * RAD, 2.0 * RAD, 2.0 * RAD)
+        sd[9:12] = (40.0, 10.0, 5.0)
+        sd[12:15] = c.wind_sigma
+        sd[15:18] = c.gyro_bias_sigma
+        sd[18:20] = c.encoder_sigma
+        sd[states.WIDTH] = c.width_sigma
+        return np.square(sd)
+
+    def _start(self, memory: Memory, m: Measurement) -> Memory:
+        """From an acquired pose: velocity from the airspeed and the approach angle, rates from the gyros."""
+        c, idx = self.config, self.blocks.index
+        x = memory.x.copy()
+        var = self._prior.copy()
+        if not memory.valid:
+            x[:] = 0.0
+            x[states.WIDTH] = self._width
+            theta = m.z[4]
+            alpha = min(max(theta - c.approach_angle, -0.1), 0.2)
+            x[states.U], x[states.W] = memory.airspeed * math.cos(alpha), memory.airspeed * math.sin(alpha)
+            x[states.P : states.R + 1] = memory.gyro
+        x[[states.X, states.Y, states.H, states.PHI, states.THETA, states.PSI]] = m.z
+        P = np.diag(var)
+        pose = [states.X, states.Y, states.H, states.PHI, states.THETA, states.PSI]
+        P[np.ix_(pose, pose)] = m.R
+        # the encoder's bias is in the acquired attitude as well
+        if states.EPAN in idx:
+            for angle, bias in ((states.PSI, states.EPAN), (states.THETA, states.ETILT)):
+                P[angle, angle] += var[bias]
+                P[angle, bias] = P[bias, angle] = -var[bias]
+        P = P[np.ix_(idx, idx)]
+        for lo, hi in zip(self.blocks.starts, self.blocks.starts[1:]):
+            P[lo:hi, :lo] = 0.0
+            P[lo:hi, hi:] = 0.0
+        shadow = memory.shadow
+        if not memory.valid:
+            alpha = math.atan2(x[states.W], x[states.U])
+            shadow = shadow.copy()
+            shadow[5] = downwash(alpha, shadow[3], x[states.H], self._par)
+        start = replace(memory, valid=True, x=x, shadow=shadow, frames=0, misses=0, rejected=0.0)
+        if c.factorisation == "ud":
+            U, D = kalman.ud_factor(P)
+            return replace(start, P=U, D=D)
+        return replace(start, P=P, D=None)
+
+    # ------------------------------------------------------------------------------------------- updates
+
+    def _process_noise(self, Phi: Array, dt: float, on_ground: bool) -> Array:
+        q = self._q_ground if on_ground else self._q_air
+        if self.config.process_noise == "constant":
+            key = (on_ground, round(dt * 1e6))
+            if key not in self._constant_Q:
+                self._constant_Q[key] = np.diag(q * dt)
+            return self._constant_Q[key]
+        return kalman.integrated_noise(Phi, q, dt, self.blocks.starts)
+
+    def _scalars(self, memory: Memory, Hx: Array, R: Array, nu: Array) -> Memory:
+        """Update by ungated scalars; Hx (m, 21)."""
+        P, D, dx, _ = self._kalman(memory, Hx[:, self.blocks.index], R, nu, np.ones(len(nu), dtype=np.bool_))
+        return replace(memory, x=self._moved(memory.x, dx), P=P, D=D)
+
+    def _kalman(
+        self, memory: Memory, Hn: Array, R: Array, nu: Array, use: np.ndarray
+    ) -> tuple[Array, Array | None, Array, float]:
+        Hn = np.ascontiguousarray(Hn)
+        if memory.D is None:
+            P, dx, nis = kalman.update_dense(memory.P.copy(), Hn, R, nu, use, self.blocks.starts)
+            return P, None, dx, nis
+        return kalman.update_ud(memory.P.copy(), memory.D.copy(), Hn, R, nu, use, self.blocks.starts)
+
+    def _moved(self, x: Array, dx: Array) -> Array:
+        out = x.copy()
+        out[self.blocks.index] += dx
+        return out
+
+    def _edges(self, memory: Memory, m: Measurement) -> Memory:
+        edges, c = m.geometry, self.config
+        if edges is None:
+            raise ValueError("a measurement of kind 'edges' needs its EdgeSet")
+        n = len(m.z)
+        found = np.isfinite(m.z)
+        h, Hx = np.empty(n), np.empty((n, states.N))
+        starting = memory.frames < c.start_frames
+        x = memory.x
+        R = np.where(found, m.R, 1.0)
+        innovation: Array | None = None
+        status = edges.status.copy()
+        use = found
+        for i in range(c.start_iterations if starting else 1):
+            self._predict_edges(x, edges, h, Hx)
+            Hn = np.ascontiguousarray(Hx[:, self.blocks.index])
+            nu = np.where(found, m.z - h, 0.0)
+            if i == 0:
+                innovation = np.where(found, nu, np.nan)
+                use = found & np.isfinite(nu)
+                if not starting and c.gate_sigma is not None:
+                    P = memory.P if memory.D is None else kalman.ud_product(memory.P, memory.D)
+                    s = kalman.innovation_variance(P, Hn, R)
+                    use &= nu * nu <= c.gate_sigma**2 * s
+                    status[found & ~use] = Status.REJECTED
+            nu = nu + Hn @ (x - memory.x)[self.blocks.index]
+            R_used = R
+            if starting:  # Huber: an edge far off at the current iterate counts less
+                sd = np.sqrt(R) * c.huber
+                R_used = R * np.maximum(1.0, np.abs(m.z - h) / sd, where=found, out=np.ones(n))
+            P_new, D_new, dx, nis = self._kalman(memory, Hn, R_used, nu, use)
+            x = self._moved(memory.x, dx)
+        dof = int(use.sum())
+        after = replace(
+            memory,
+            x=x,
+            P=P_new,
+            D=D_new,
+            frames=memory.frames + 1,
+            misses=0 if dof else memory.misses + 1,
+            threshold_in_view=bool(np.any(use & (edges.feature == Feature.THRESHOLD))),
+            residuals=Residuals(innovation if innovation is not None else np.full(n, np.nan), status, nis, dof),
+            reinflated=max(0, memory.reinflated - 1),
+        )
+        return self._watchdog(after, int(found.sum()), dof)
+
+    def _predict_edges(self, x: Array, edges: EdgeSet, h: Array, Hx: Array) -> None:
+        edge_model(
+            x, edges.feature, edges.centre, edges.direction, edges.pan, edges.tilt,
+            self._lever, self._focal, self._slope, h, Hx,
+        )  # fmt: skip
+
+    def _watchdog(self, memory: Memory, found: int, used: int) -> Memory:
+        """A filter that rejects what it sees is the one that is wrong: open up and start over from here."""
+        c = self.config
+        if found == 0:
+            return memory
+        share = memory.rejected + ((found - used) / found - memory.rejected) / c.watchdog_memory
+        if share <= c.watchdog_share:
+            return replace(memory, rejected=share)
+        P = memory.P if memory.D is None else kalman.ud_product(memory.P, memory.D)
+        P = P + np.diag(0.25 * self._prior[self.blocks.index])
+        opened = replace(memory, rejected=0.0, frames=c.start_frames - 5, reinflated=16)
+        if memory.D is None:
+            return replace(opened, P=P)
+        U, D = kalman.ud_factor(P)
+        return replace(opened, P=U, D=D)

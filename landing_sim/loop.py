@@ -1,0 +1,111 @@
+"""The closed loop: the only one.
+
+Time is counted in whole steps of the plant. Once a cycle the sensors look, what has arrived is estimated from, guidance
+and controller decide, and their command acts after the computing delay; in between the plant steps through the wind.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from landing_sim.interfaces import Controller, Estimator, FrontEnd, Guidance, Plant, Sensor, World
+from landing_sim.signals import Command, Measurement, Sample, Step
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """Whole numbers of plant steps. Raises ValueError where a period is not one."""
+
+    dt: float  # [s] plant step
+    cycle: int  # steps per control cycle
+    delay: int  # steps from a command's computation to its effect
+
+    @staticmethod
+    def of(dt: float, cycle_s: float, delay_s: float) -> Clock:
+        return Clock(dt, whole_steps(cycle_s, dt), whole_steps(delay_s, dt))
+
+
+def whole_steps(period: float, dt: float) -> int:
+    """How many steps of dt make `period`; ValueError if that is not a whole number."""
+    n = round(period / dt)
+    if abs(n * dt - period) > 1e-9:
+        raise ValueError(f"a period of {period} s is not a whole number of {dt} s steps")
+    return n
+
+
+def simulate(
+    clock: Clock,
+    plant: Plant,
+    world: World,
+    sensors: Sequence[Sensor],
+    front_ends: Mapping[str, FrontEnd],
+    estimator: Estimator,
+    guidance: Guidance,
+    controller: Controller,
+    trim: Command,
+) -> Iterator[Step]:
+    """Fly; yields one Step a control cycle, for ever: whoever listens decides when it is over.
+
+    `sensors` are read in the order given. `front_ends` maps a sensor's name to what turns its samples into measurements.
+    `trim` acts until the first command does. Nothing but samples crosses from the truth to the onboard side.
+    """
+    periods = [whole_steps(sensor.period, clock.dt) for sensor in sensors]
+    truth = plant.reset()
+    tick = 0
+    memory = estimator.init(0.0)
+    guidance_memory, controller_memory = guidance.init(), controller.init()
+    acting = trim
+    pending: deque[tuple[int, Command]] = deque()
+    in_flight: list[Sample] = []
+
+    while True:
+        t = tick * clock.dt
+        camera = plant.camera()
+
+        # what the sensors see now, and what has reached the computer by now
+        for sensor, period in zip(sensors, periods):
+            if tick % period == 0:
+                sample = sensor.sense(truth, camera)
+                if sample is not None:
+                    in_flight.append(sample)
+        arrived = tuple(s for s in in_flight if s.t_arrival <= t + 1e-9)
+        if arrived:
+            in_flight = [s for s in in_flight if s.t_arrival > t + 1e-9]
+
+        # the onboard side
+        memory = estimator.predict(memory, acting, t)
+        measured: list[Measurement] = []
+        for sample in arrived:
+            for measurement in front_ends[sample.sensor].process(sample, estimator.read(memory, sample.t_valid)):
+                memory = estimator.update(memory, measurement)
+                measured.append(measurement)
+        estimate = estimator.read(memory)
+        guidance_memory, reference = guidance.step(guidance_memory, estimate)
+        controller_memory, command = controller.step(controller_memory, estimate, reference)
+        pending.append((tick + clock.delay, command))
+
+        seen = estimate.residuals
+        yield Step(
+            truth,
+            camera,
+            arrived,
+            tuple(measured),
+            estimate,
+            reference,
+            command,
+            None if seen is None else seen.innovation,
+            float("nan") if seen is None else seen.nis,
+            0 if seen is None else seen.dof,
+        )
+
+        # the world moves on
+        for _ in range(clock.cycle):
+            if pending and pending[0][0] <= tick:
+                memory = estimator.predict(memory, acting, tick * clock.dt)
+                acting = pending.popleft()[1]
+            wind = world.wind(tick * clock.dt, *plant.fast_truth())
+            plant.step(acting, wind)
+            tick += 1
+        truth = plant.truth()
