@@ -1,0 +1,392 @@
+"""Recordings for the rerun viewer. The only module that imports rerun, and only when it is used.
+
+What is seen: the runway, the true and the estimated path and the aircraft with its camera in 3-D; the camera image with
+windows, measured and predicted edges; every error with its 3-sigma band; commands; flight phases and events.
+Positions are in R, local to the threshold: the viewer's float32 would lose them in geocentric coordinates.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from landing_sim.geometry.so3 import camera_from_body, from_euler
+from landing_sim.record import overlay, shapes
+from landing_sim.record.log import FlightLog
+from landing_sim.signals import Feature, Status, Step
+
+if TYPE_CHECKING:
+    import rerun as rr
+
+TIMELINE = "time"
+TRUE_COLOUR, ESTIMATE_COLOUR, BAND_COLOUR = (60, 220, 120), (255, 170, 40), (150, 150, 165)
+IMAGE = "world/camera/image"
+DEGREES = 57.29577951308232
+
+ERRORS = (  # entity, state, title, factor to the unit shown
+    ("errors/x", "x", "range x [m]", 1.0),
+    ("errors/y", "y", "lateral y [m]", 1.0),
+    ("errors/H", "H", "height H [m]", 1.0),
+    ("errors/phi", "phi", "roll [deg]", DEGREES),
+    ("errors/theta", "theta", "pitch [deg]", DEGREES),
+    ("errors/psi", "psi", "yaw [deg]", DEGREES),
+    ("errors/u", "u", "forward speed u [m/s]", 1.0),
+    ("errors/wy", "wy", "crosswind [m/s]", 1.0),
+)
+SERIES = (  # entity, title, ((column, name, factor), ...)
+    ("flight/height", "height of the cg [m]", (("true_H_m", "true", 1.0), ("ref_height_m", "reference", 1.0))),
+    ("flight/lateral", "lateral offset [m]", (("true_y_m", "true", 1.0), ("ref_y_m", "reference", 1.0))),
+    (
+        "flight/airspeed",
+        "airspeed [m/s]",
+        (
+            ("true_airspeed_mps", "true", 1.0),
+            ("meas_airspeed_mps", "measured", 1.0),
+            ("ref_airspeed_mps", "reference", 1.0),
+        ),
+    ),
+    (
+        "flight/attitude",
+        "attitude [deg]",
+        (("true_phi_rad", "roll", DEGREES), ("true_theta_rad", "pitch", DEGREES), ("true_psi_rad", "yaw", DEGREES)),
+    ),
+    (
+        "flight/wind",
+        "true wind in R [m/s]",
+        (("true_wx_mps", "along", 1.0), ("true_wy_mps", "across", 1.0), ("true_wz_mps", "down", 1.0)),
+    ),
+    (
+        "flight/commands",
+        "commands [deg]",
+        (
+            ("cmd_elevator_rad", "elevator", DEGREES),
+            ("cmd_aileron_rad", "aileron", DEGREES),
+            ("cmd_rudder_rad", "rudder", DEGREES),
+        ),
+    ),
+    ("flight/throttle", "throttle, brakes", (("cmd_throttle", "throttle", 1.0), ("cmd_brake_left", "brake", 1.0))),
+    ("flight/nis", "innovation: NIS per measurement", (("nis_ratio", "NIS", 1.0),)),
+)
+MODE_COLOURS = {
+    "acquire": 0x8D99AEFF,
+    "capture": 0x4CC9F0FF,
+    "glide": 0x4895EFFF,
+    "flare": 0xF9A03FFF,
+    "decrab": 0xF3722CFF,
+    "rollout": 0x43AA8BFF,
+    "stopped": 0x577590FF,
+    "go_around": 0xE63946FF,
+}
+
+
+class ReplayError(RuntimeError):
+    """The recording cannot be written or shown."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What stands still in a recording. The camera is the believed one: predicted edges are the filter's."""
+
+    camera: overlay.BelievedCamera
+    width: float  # [m] of the true runway
+    length: float
+    slope: float = 0.0  # [rad]
+    span: float = 15.6  # [m] of the aircraft
+    fuselage: float = 11.4
+    markings: bool = True
+    title: str = "landing-sim"
+
+
+class Recorder:
+    """Writes one recording: `add` each step as it is flown, then `close` with the finished log.
+
+    Parameters
+    ----------
+    path : the .rrd file
+    frames_hz : camera images a second; 0 = none. An image is rendered only if it is recorded.
+    live : also show the flight in a viewer while it lasts
+
+    Raises ReplayError if the file cannot be written.
+    """
+
+    def __init__(self, path: Path, scene: Scene, frames_hz: float = 8.0, live: bool = False) -> None:
+        rr = _rerun()
+        self._scene = scene
+        self._period = 1.0 / frames_hz if frames_hz > 0.0 else np.inf
+        self._next_frame = -np.inf
+        self._live = live
+        self._stream = rr.RecordingStream("landing-sim", recording_id=path.stem)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            if live:
+                self._stream.spawn(connect=False)
+                self._stream.set_sinks(rr.GrpcSink(), rr.FileSink(str(path)), default_blueprint=_blueprint(scene))
+            else:
+                self._stream.save(path, default_blueprint=_blueprint(scene))
+        except Exception as error:
+            raise ReplayError(f"cannot record to {path}: {error}") from error
+        self._stream.send_recording_name(scene.title)
+        self._draw_world()
+
+    def add(self, step: Step) -> None:
+        """The camera image of this step, if it is time for one, with what was seen in it."""
+        sample = overlay.camera_sample(step.samples)
+        if sample is None or step.truth.t < self._next_frame - 1e-9:
+            return
+        self._next_frame = step.truth.t + self._period
+        rr, stream = _rerun(), self._stream
+        stream.set_time(TIMELINE, duration=step.truth.t)
+        stream.log(IMAGE, rr.EncodedImage(contents=_jpeg(sample.frame.full()), media_type="image/jpeg"))
+        if step.estimate.valid:
+            lines = overlay.predicted_edges(step.estimate, sample.pan, sample.tilt, self._scene.camera)
+            colours = [overlay.FEATURE_COLOURS[Feature(f)] for f in lines.feature]
+            stream.log(f"{IMAGE}/predicted", rr.LineStrips2D(lines.ends, colors=colours, radii=0.8, draw_order=10.0))
+        edges = next((m for m in step.measurements if m.geometry is not None), None)
+        if edges is not None and edges.geometry is not None:
+            geometry = edges.geometry
+            status = [overlay.STATUS_COLOURS[Status(s)] for s in geometry.status]
+            found = overlay.measured_edges(geometry, edges.z)
+            boxes = overlay.window_boxes(geometry)
+            stream.log(f"{IMAGE}/windows", rr.LineStrips2D(boxes, colors=status, radii=0.5, draw_order=20.0))
+            stream.log(
+                f"{IMAGE}/measured", rr.LineStrips2D(found.ends, colors=(255, 255, 0), radii=1.2, draw_order=30.0)
+            )
+        if self._live:
+            self._follow(step)
+
+    def close(self, log: FlightLog) -> None:
+        """Everything that does not need pixels, from the log; then the file is complete."""
+        record_log(self._stream, log)
+        self._stream.flush()
+        self._stream.disconnect()
+
+    def _follow(self, step: Step) -> None:
+        rr, truth, stream = _rerun(), step.truth, self._stream
+        stream.log("world/aircraft", rr.Transform3D(translation=truth.p_RB, mat3x3=truth.R_RB))
+        stream.log("world/camera", rr.Transform3D(translation=step.camera.p_RC, mat3x3=step.camera.R_CR.T))
+        if step.estimate.valid:
+            true = {"x": truth.p_RB[0], "y": truth.p_RB[1], "H": -truth.p_RB[2]} | dict(
+                zip(("phi", "theta", "psi"), truth.euler)
+            )
+            for entity, name, _, factor in ERRORS[:6]:
+                stream.log(entity, rr.Scalars([factor * (step.estimate[name] - float(true[name]))]))
+
+    def _draw_world(self) -> None:
+        rr, stream, scene = _rerun(), self._stream, self._scene
+        k = scene.camera.intrinsics
+        stream.log("world", rr.ViewCoordinates.FRD, static=True)
+        tan = float(np.tan(scene.slope))
+        grass = shapes.rectangle(-2500.0, scene.length + 1500.0, -1200.0, 1200.0, -0.4 - max(0.0, 2500.0 * tan))
+        for entity, mesh, colour in (
+            ("ground", shapes.polygons([grass]), (52, 74, 48)),
+            (
+                "runway",
+                shapes.polygons(
+                    [shapes.rectangle(0.0, scene.length, -0.5 * scene.width, 0.5 * scene.width, 0.0, scene.slope)]
+                ),
+                (96, 98, 104),
+            ),
+            (
+                "markings",
+                shapes.polygons(shapes.markings(scene.width, scene.length, scene.slope, 0.25)),
+                (240, 240, 240),
+            ),
+            ("aircraft/body", shapes.aircraft(scene.span, scene.fuselage), (235, 238, 245)),
+        ):
+            if entity == "markings" and not scene.markings:
+                continue
+            vertices, triangles = mesh
+            normals = None if entity == "aircraft/body" else np.tile(np.float32([0.0, 0.0, -1.0]), (len(vertices), 1))
+            stream.log(
+                f"world/{entity}",
+                rr.Mesh3D(
+                    vertex_positions=vertices, triangle_indices=triangles, vertex_normals=normals, albedo_factor=colour
+                ),
+                static=True,
+            )
+        pinhole = rr.Pinhole(
+            image_from_camera=k.K,
+            width=k.width,
+            height=k.height,
+            camera_xyz=rr.ViewCoordinates.RDF,
+            image_plane_distance=60.0,
+            color=(255, 255, 255, 90),
+        )
+        stream.log(IMAGE, pinhole, static=True)
+        for entity, _, title, _ in ERRORS:
+            names = ["error", "+3 sigma", "-3 sigma"]
+            style = rr.SeriesLines(
+                colors=[ESTIMATE_COLOUR, BAND_COLOUR, BAND_COLOUR], names=names, widths=[2.0, 1.0, 1.0]
+            )
+            stream.log(entity, style, static=True)
+        for entity, _, series in SERIES:
+            stream.log(entity, rr.SeriesLines(names=[name for _, name, _ in series]), static=True)
+        labels = list(MODE_COLOURS)
+        modes = rr.StateConfiguration(values=labels, labels=labels, colors=[MODE_COLOURS[m] for m in labels])
+        stream.log("flight/phase", modes, static=True)
+
+
+def record_log(stream: rr.RecordingStream, log: FlightLog) -> None:
+    """Paths, poses, series and events of a finished flight into an open recording."""
+    rr = _rerun()
+    t = log["t_s"]
+
+    def times(which: np.ndarray | slice) -> list[Any]:
+        return [rr.TimeColumn(TIMELINE, duration=t[which])]
+
+    everything = slice(None)
+    p = np.column_stack([log["true_x_m"], log["true_y_m"], log["true_z_m"]])
+    R_RB = [from_euler(*e) for e in zip(log["true_phi_rad"], log["true_theta_rad"], log["true_psi_rad"])]
+    p_camera = np.column_stack([log["true_camera_x_m"], log["true_camera_y_m"], log["true_camera_z_m"]])
+    R_RC = [R @ camera_from_body(pan, tilt).T for R, pan, tilt in zip(R_RB, log["true_pan_rad"], log["true_tilt_rad"])]
+    for entity, position, rotations in (("world/aircraft", p, R_RB), ("world/camera", p_camera, R_RC)):
+        columns = rr.Transform3D.columns(translation=position, mat3x3=np.stack(rotations))
+        stream.send_columns(entity, times(everything), columns)
+    stream.log("world/path/true", rr.LineStrips3D([p], colors=TRUE_COLOUR, radii=rr.Radius.ui_points(2.0)), static=True)
+    known = log["valid"]
+    believed = np.column_stack([log.estimate("x"), log.estimate("y"), -log.estimate("H")])[known]
+    if len(believed) > 1:
+        path = rr.LineStrips3D([believed], colors=ESTIMATE_COLOUR, radii=rr.Radius.ui_points(1.2))
+        stream.log("world/path/estimated", path, static=True)
+    for entity, name, _, factor in ERRORS:
+        error, sigma = factor * log.error(name), factor * log.sigma(name)
+        use = np.isfinite(error)
+        if use.any():
+            band = np.column_stack([error, 3.0 * sigma, -3.0 * sigma])[use]
+            stream.send_columns(entity, times(use), rr.Scalars.columns(scalars=band))
+    nis_ratio = np.where(log["nis_dof"] > 0, log["nis"] / np.maximum(log["nis_dof"], 1), np.nan)
+    derived = {"nis_ratio": nis_ratio}
+    for entity, _, series in SERIES:
+        values = np.column_stack([factor * (derived[c] if c in derived else log[c]) for c, _, factor in series])
+        use = np.isfinite(values).any(axis=1)
+        if use.any():
+            stream.send_columns(entity, times(use), rr.Scalars.columns(scalars=values[use]))
+    modes = log["mode"]
+    changes = np.flatnonzero(np.concatenate([[True], modes[1:] != modes[:-1]]))
+    for k in changes:
+        stream.set_time(TIMELINE, duration=float(t[k]))
+        stream.log("flight/phase", rr.StateChange(state=str(modes[k])))
+    for when, text in events(log):
+        stream.set_time(TIMELINE, duration=when)
+        stream.log("flight/events", rr.TextLog(text, level=rr.TextLogLevel.INFO))
+
+
+def events(log: FlightLog) -> Iterator[tuple[float, str]]:
+    """(time [s], what happened), in order."""
+    t, x, modes = log["t_s"], log["true_x_m"], log["mode"]
+    found: list[tuple[float, str]] = []
+    for k in np.flatnonzero(np.concatenate([[True], modes[1:] != modes[:-1]])):
+        found.append((float(t[k]), f"phase: {modes[k]} at x = {x[k]:.0f} m, H = {log['true_H_m'][k]:.1f} m"))
+    if log["valid"].any():
+        k = int(np.argmax(log["valid"]))
+        error = abs(log.error("x")[k])
+        found.append((float(t[k]), f"runway acquired at x = {x[k]:.0f} m; range off by {error:.1f} m"))
+    if "threshold_found" in log and log["threshold_found"].any():
+        k = len(t) - 1 - int(np.argmax(log["threshold_found"][::-1]))
+        found.append((float(t[k]), f"threshold last seen {-x[k]:.0f} m before it"))
+    touchdown = log.touchdown
+    if touchdown is not None:
+        where = f"x = {touchdown.x:.0f} m, y = {touchdown.y:.2f} m"
+        found.append(
+            (touchdown.t, f"touchdown at {where}, sink {touchdown.sink_rate:.2f} m/s, {touchdown.airspeed:.1f} m/s")
+        )
+    yield from sorted(found)
+
+
+def open_viewer(path: Path, web: bool = False) -> None:
+    """Show a recording until the viewer is closed; nothing but this machine can reach it.
+
+    web : serve it to a browser instead of opening a window. Raises ReplayError if it cannot be shown.
+    """
+    beside = Path(sys.executable).with_name("rerun")
+    program = str(beside) if beside.exists() else shutil.which("rerun")
+    if program is None:
+        raise ReplayError("the rerun viewer is missing: install it with `pip install 'rerun-sdk>=0.41,<0.42'`")
+    if not path.is_file():
+        raise ReplayError(f"{path}: no such recording")
+    command = [program, "--bind", "127.0.0.1", *(["--web-viewer"] if web else []), str(path)]
+    try:
+        code = subprocess.run(command, check=False).returncode
+    except KeyboardInterrupt:
+        return
+    if code != 0:
+        hint = "" if web else "; without a display, `--web` shows it in a browser"
+        raise ReplayError(f"the viewer ended with code {code}{hint}")
+
+
+def _blueprint(scene: Scene) -> Any:
+    import rerun.blueprint as rrb
+
+    def plot(entity: str, title: str, span: tuple[float, float] | None = None) -> Any:
+        axis = None if span is None else rrb.ScalarAxis(range=span)
+        return rrb.TimeSeriesView(
+            origin=entity, name=title, axis_y=axis, plot_legend=rrb.PlotLegend(visible=span is None)
+        )
+
+    chase = rrb.Spatial3DView(
+        origin="world",
+        name="runway, true path (green) and estimated path (orange)",
+        background=(24, 28, 36),
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(
+            position=(-1130.0, -190.0, -130.0), look_target=(-300.0, 0.0, -10.0), eye_up=(0.0, 0.0, -1.0)
+        ),
+    )
+    image = rrb.Spatial2DView(origin=IMAGE, name="camera: windows (white), measured (yellow), predicted edges")
+    errors = rrb.Grid(
+        *(plot(e, title, _SPANS.get(e)) for e, _, title, _ in ERRORS), grid_columns=4, name="errors and 3 sigma"
+    )
+    flight = rrb.Grid(*(plot(e, title) for e, title, _ in SERIES), grid_columns=4, name="flight and commands")
+    phases = rrb.Vertical(
+        rrb.StateTimelineView(origin="flight/phase", name="phase"),
+        rrb.TextLogView(origin="flight/events", name="events"),
+        name="phases and events",
+    )
+    return rrb.Blueprint(
+        rrb.Vertical(
+            rrb.Horizontal(chase, image, column_shares=[3, 2]),
+            rrb.Tabs(errors, flight, phases, active_tab=0),
+            row_shares=[3, 2],
+        ),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing", loop_mode="all"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+    )
+
+
+_SPANS = {
+    "errors/x": (-20.0, 20.0),
+    "errors/y": (-1.5, 1.5),
+    "errors/H": (-1.5, 1.5),
+    "errors/phi": (-0.6, 0.6),
+    "errors/theta": (-0.3, 0.3),
+    "errors/psi": (-0.6, 0.6),
+    "errors/u": (-2.0, 2.0),
+    "errors/wy": (-2.0, 2.0),
+}
+
+
+def _jpeg(pixels: np.ndarray) -> bytes:
+    import cv2
+
+    ok, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, 85])
+    if not ok:
+        raise ReplayError(f"cannot encode an image of shape {pixels.shape}")
+    return bytes(data)
+
+
+def _rerun() -> Any:
+    try:
+        import rerun
+    except ImportError as error:
+        raise ReplayError(
+            f"rerun is missing ({error}): pip install 'rerun-sdk>=0.41,<0.42', or run with --no-record"
+        ) from error
+    return rerun
