@@ -1,15 +1,9 @@
 """Faults of any sensor, in PX4's words: a sensor wrapped in a `Faulty` is a sensor again; wrap twice for two faults.
 
-    off            sends nothing
-    stuck          repeats the last reading from before the fault, with fresh time stamps (a camera: the last image)
-    garbage        numbers that have nothing to do with the truth: normal with sigma `spread` (a camera: random pixels)
-    wrong          scale * reading + bias
-    slow           sends every `factor`-th sample only
-    delayed        arrives `delay` later; unless `honest_time`, it claims to be that much younger than it is
-    intermittent   each sample is lost with probability `loss`
+Every fault acts on the samples with start <= t_valid < end [s]. The wrapped sensor is read all the while, so that
+after the fault, or in the same flight without it, it draws the same noise.
 
-The wrapped sensor is read all the while, so that after the fault, or beside a flight without it, it draws the same
-noise. Source: the words are MAVLink's FAILURE_TYPE, as used by PX4's failure injection; the meanings are ours.
+Source     the words are those of PX4's failure injection (MAVLink FAILURE_TYPE); their exact meanings here are ours.
 """
 
 from __future__ import annotations
@@ -17,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from statistics import NormalDist
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -25,64 +19,120 @@ from landing_sim.interfaces import Sensor
 from landing_sim.noise import NoiseStream
 from landing_sim.signals import CameraSample, CameraTruth, Sample, Truth
 
-Kind = Literal["off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent"]
 
-# what each kind must be given, beside its times; anything else given is a mistake
-_NEEDS: dict[str, frozenset[str]] = {
-    "off": frozenset(),
-    "stuck": frozenset(),
-    "garbage": frozenset({"spread"}),
-    "wrong": frozenset({"bias", "scale"}),
-    "slow": frozenset({"factor"}),
-    "delayed": frozenset({"delay", "honest_time"}),
-    "intermittent": frozenset({"loss"}),
-}
+@dataclass(frozen=True, slots=True)
+class Off:
+    """Sends nothing."""
 
-_WANTED = {
-    "wrong": "a finite bias, a finite scale, or both",
-    "garbage": "a finite spread > 0 in the reading's unit",
-    "slow": "a whole factor >= 2",
-    "delayed": "a finite delay > 0 s",
-    "intermittent": "a loss probability between 0 and 1; for 1 use 'off'",
-}
+    start: float = 0.0
+    end: float = math.inf
+
+    def __post_init__(self) -> None:
+        _check_times(self)
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
-    """One fault, acting on samples with start <= t_valid < end [s]. None: not given."""
+class Stuck:
+    """Repeats the last reading from before the fault under fresh time stamps; a camera repeats its last image."""
 
-    kind: Kind
     start: float = 0.0
     end: float = math.inf
-    spread: float | None = None  # garbage: 1 sigma, in the reading's unit; a camera takes none
-    bias: float | tuple[float, ...] | None = None  # wrong: in the reading's unit, one for all axes or one each
-    scale: float | None = None  # wrong: factor
-    factor: int | None = None  # slow: 1 sample in so many
-    delay: float | None = None  # delayed: [s]
-    honest_time: bool | None = None  # delayed: t_valid stays true (the default)
-    loss: float | None = None  # intermittent: probability, 0..1
 
     def __post_init__(self) -> None:
-        if self.kind not in _NEEDS:
-            raise ValueError(f"fault: no kind {self.kind!r}; choose from {', '.join(_NEEDS)}")
-        if not (math.isfinite(self.start) and self.end > self.start):
-            raise ValueError(f"fault {self.kind}: needs start < end, got {self.start} and {self.end} s")
-        for name in ("spread", "bias", "scale", "factor", "delay", "honest_time", "loss"):
-            if getattr(self, name) is not None and name not in _NEEDS[self.kind]:
-                raise ValueError(f"fault {self.kind}: {name!r} means nothing to it")
-        problem = {
-            "wrong": (self.bias is None and self.scale is None) or not _all_finite(self.bias, self.scale),
-            "garbage": self.spread is not None and not (_all_finite(self.spread) and self.spread > 0.0),
-            "slow": not (isinstance(self.factor, int) and self.factor >= 2),
-            "delayed": not (_all_finite(self.delay) and (self.delay or 0.0) > 0.0),
-            "intermittent": not (self.loss is not None and 0.0 < self.loss < 1.0),
-        }.get(self.kind, False)
-        if problem:
-            raise ValueError(f"fault {self.kind}: needs {_WANTED[self.kind]}")
+        _check_times(self)
 
 
-def _all_finite(*values: float | tuple[float, ...] | None) -> bool:
-    return all(bool(np.isfinite(np.asarray(value)).all()) for value in values if value is not None)
+@dataclass(frozen=True, slots=True)
+class Garbage:
+    """Readings that have nothing to do with the truth: normal, sigma `spread`; random pixels of a camera."""
+
+    spread: float | None = None  # in the reading's unit; None for a camera
+    start: float = 0.0
+    end: float = math.inf
+
+    def __post_init__(self) -> None:
+        _check_times(self)
+        if self.spread is not None and not (math.isfinite(self.spread) and self.spread > 0.0):
+            raise ValueError(f"fault garbage: spread must be finite and > 0, not {self.spread}")
+
+
+@dataclass(frozen=True, slots=True)
+class Wrong:
+    """scale * reading + bias."""
+
+    bias: float | tuple[float, ...] = 0.0  # in the reading's unit: one number for all axes, or one each
+    scale: float = 1.0
+    start: float = 0.0
+    end: float = math.inf
+
+    def __post_init__(self) -> None:
+        _check_times(self)
+        if not (np.isfinite(self.bias).all() and math.isfinite(self.scale)):
+            raise ValueError(f"fault wrong: bias and scale must be finite, not {self.bias} and {self.scale}")
+        if self.scale == 1.0 and not np.any(self.bias):
+            raise ValueError("fault wrong: give a bias other than 0 or a scale other than 1")
+
+
+@dataclass(frozen=True, slots=True)
+class Slow:
+    """Sends one sample in `factor`, the first of the fault among them."""
+
+    factor: int
+    start: float = 0.0
+    end: float = math.inf
+
+    def __post_init__(self) -> None:
+        _check_times(self)
+        if not (isinstance(self.factor, int) and self.factor >= 2):
+            raise ValueError(f"fault slow: factor must be a whole number >= 2, not {self.factor}")
+
+
+@dataclass(frozen=True, slots=True)
+class Delayed:
+    """Samples arrive `delay` [s] later. Without `honest_time` they also claim to have been taken that much later."""
+
+    delay: float
+    honest_time: bool = True
+    start: float = 0.0
+    end: float = math.inf
+
+    def __post_init__(self) -> None:
+        _check_times(self)
+        if not (math.isfinite(self.delay) and self.delay > 0.0):
+            raise ValueError(f"fault delayed: delay must be finite and > 0 s, not {self.delay}")
+
+
+@dataclass(frozen=True, slots=True)
+class Intermittent:
+    """Every sample is lost with the probability `loss`, independently."""
+
+    loss: float
+    start: float = 0.0
+    end: float = math.inf
+
+    def __post_init__(self) -> None:
+        _check_times(self)
+        if not 0.0 < self.loss < 1.0:
+            raise ValueError(f"fault intermittent: loss must lie between 0 and 1, not {self.loss}; always is 'off'")
+
+
+Fault = Off | Stuck | Garbage | Wrong | Slow | Delayed | Intermittent
+
+FAULTS: dict[str, type[Fault]] = {
+    "off": Off,
+    "stuck": Stuck,
+    "garbage": Garbage,
+    "wrong": Wrong,
+    "slow": Slow,
+    "delayed": Delayed,
+    "intermittent": Intermittent,
+}  # by PX4's word
+
+
+def _check_times(fault: Fault) -> None:
+    if not (math.isfinite(fault.start) and fault.end > fault.start):
+        word = type(fault).__name__.lower()
+        raise ValueError(f"fault {word}: needs a finite start before its end, got {fault.start} and {fault.end} s")
 
 
 class Faulty:
@@ -104,60 +154,60 @@ class Faulty:
         self.sensor = sensor
         self.fault = fault
         self._noise = noise
-        self._held: Any = None  # stuck: the reading repeated
-        self._count = 0  # slow: samples since the fault began
-        self._lost_below = NormalDist().inv_cdf(fault.loss) if fault.loss is not None else 0.0
-        where = f"fault {fault.kind} on {sensor.name}"
-        if fault.kind == "wrong" and self.channels == 0:
-            raise ValueError(
-                f"{where}: an image has no bias or scale; falsify the calibration, encoder bias or exposure instead"
-            )
-        if fault.kind == "garbage" and (fault.spread is None) != (self.channels == 0):
-            raise ValueError(
-                f"{where}: " + ("needs a spread" if self.channels else "random pixels have no spread; leave it out")
-            )
-        if isinstance(fault.bias, tuple) and len(fault.bias) != self.channels:
-            raise ValueError(f"{where}: bias needs {self.channels} numbers, got {len(fault.bias)}")
-        bias = fault.bias[0] if isinstance(fault.bias, tuple) and self.channels == 1 else fault.bias
-        self._bias: Any = np.array(bias) if isinstance(bias, tuple) else bias or 0.0
+        self._held: Any = None  # Stuck: what is repeated
+        self._count = 0  # Slow: samples since the fault began
+        self._lost_below = NormalDist().inv_cdf(fault.loss) if isinstance(fault, Intermittent) else -math.inf
+        self._bias: Any = _fitting_bias(fault, self.channels, self.name) if isinstance(fault, Wrong) else 0.0
+        if isinstance(fault, Garbage) and (fault.spread is None) != (self.channels == 0):
+            advice = "random pixels have no spread; leave it out" if self.channels == 0 else "needs a spread"
+            raise ValueError(f"fault garbage on {self.name}: {advice}")
 
     def sense(self, truth: Truth, camera: CameraTruth) -> Sample | None:
         sample = self.sensor.sense(truth, camera)
         fault = self.fault
-        if sample is None:
-            return None
-        if not fault.start <= sample.t_valid < fault.end:
-            if sample.t_valid < fault.start:
+        if sample is None or not fault.start <= sample.t_valid < fault.end:
+            if sample is not None and sample.t_valid < fault.start:
                 self._held = sample.data
             return sample
-        match fault.kind:
-            case "off":
+        match fault:
+            case Off():
                 return None
-            case "stuck":
+            case Stuck():
                 if self._held is None:
                     self._held = sample.data
                 return replace(sample, data=_repeat(self._held, sample.data))
-            case "garbage":
-                return replace(sample, data=self._garbage(sample.data))
-            case "wrong":
-                scale = 1.0 if fault.scale is None else fault.scale
-                return replace(sample, data=scale * sample.data + self._bias)
-            case "slow":
+            case Garbage():
+                return replace(sample, data=self._garbage(sample.data, fault.spread))
+            case Wrong():
+                return replace(sample, data=fault.scale * sample.data + self._bias)
+            case Slow():
                 self._count += 1
-                return sample if (self._count - 1) % (fault.factor or 1) == 0 else None
-            case "delayed":
-                delay = fault.delay or 0.0
-                t_valid = sample.t_valid + (delay if fault.honest_time is False else 0.0)
-                return replace(sample, t_valid=t_valid, t_arrival=sample.t_arrival + delay)
-            case "intermittent":
+                return sample if self._count % fault.factor == 1 else None
+            case Delayed():
+                t_valid = sample.t_valid if fault.honest_time else sample.t_valid + fault.delay
+                return replace(sample, t_valid=t_valid, t_arrival=sample.t_arrival + fault.delay)
+            case Intermittent():
                 return None if self._noise.normal(1)[0] < self._lost_below else sample
 
-    def _garbage(self, data: Any) -> Any:
-        if isinstance(data, CameraSample):
+    def _garbage(self, data: Any, spread: float | None) -> Any:
+        if spread is None:
             frame = RandomFrame(data.frame.width, data.frame.height, self._noise.key(), data.index)
             return replace(data, frame=frame)
-        drawn = (self.fault.spread or 0.0) * self._noise.normal(self.channels)
+        drawn = spread * self._noise.normal(self.channels)
         return float(drawn[0]) if self.channels == 1 else drawn
+
+
+def _fitting_bias(fault: Wrong, channels: int, name: str) -> Any:
+    """The bias in the shape of the sensor's reading: a float, or an array of `channels`."""
+    if channels == 0:
+        raise ValueError(
+            f"fault wrong on {name}: an image has no bias or scale; falsify calibration, encoders or exposure"
+        )
+    if not isinstance(fault.bias, tuple):
+        return fault.bias
+    if len(fault.bias) != channels:
+        raise ValueError(f"fault wrong on {name}: bias needs {channels} number(s), got {len(fault.bias)}")
+    return fault.bias[0] if channels == 1 else np.array(fault.bias)
 
 
 def _repeat(held: Any, data: Any) -> Any:
