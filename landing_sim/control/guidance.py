@@ -1,0 +1,233 @@
+"""What to fly: capture of the centreline, glide, flare, decrab, rollout, and when to give up.
+
+Heights along the path are those of the main wheels, at the wheels' place along the runway: the cg is most of two metres
+higher, which at a flare's angle is most of a hundred metres of runway.
+
+Source     Dickmanns & Schell 1992, section 6 and fig. 8 (shape of the trajectory), section 7.1 (its figures).
+           Departs: the centreline is captured by a turn of constant bank that meets a linear law tangentially, and the
+           flare aims below the surface, since one that ends at zero height floats.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from landing_sim.control.believed import Believed, Motion, believed, motion
+from landing_sim.control.settings import GearSettings, GuidanceSettings, PathSettings
+from landing_sim.signals import Estimate, Reference
+
+GRAVITY = 9.80665
+AIRBORNE = ("acquire", "capture", "glide", "flare", "decrab")
+
+
+@dataclass(frozen=True, slots=True)
+class GuidanceMemory:
+    """Phase of flight and what it remembers."""
+
+    mode: str = "acquire"
+    t: float = -math.inf  # [s] of the last step
+    seen: float = -math.inf  # [s] when the estimate was last valid
+    crosswind: float = 0.0  # [m/s] smoothed
+    waiting: float = 0.0  # [s] for how long touchdown or instability has been suspected
+    start_height: float = 0.0  # [m] of a go-around
+    start: float = 0.0  # [s] of a go-around
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """Glide and exponential flare of the wheels over x, with continuous height and slope; airspeed over x."""
+
+    slope: float  # tan of the glide angle
+    flare_x: float  # [m] where the flare begins
+    top: float  # [m] flare height + sink height
+    length: float  # [m] of the exponential
+    sink_height: float
+    touchdown_x: float
+    approach: float  # [m/s]
+    touchdown: float
+
+    @staticmethod
+    def from_settings(s: PathSettings) -> Path:
+        slope = math.tan(math.radians(s.glide_deg))
+        top = s.flare_height_m + s.sink_height_m
+        length = top / slope
+        flare_x = s.touchdown_x_m - length * math.log(top / s.sink_height_m)
+        return Path(slope, flare_x, top, length, s.sink_height_m, s.touchdown_x_m, s.approach_mps, s.touchdown_mps)
+
+    def height(self, x: float) -> tuple[float, float, float]:
+        """Height of the wheels [m], dH/dx and d2H/dx2 [1/m] at x; below the surface past the touchdown point."""
+        if x <= self.flare_x:
+            return self.top - self.sink_height + (self.flare_x - x) * self.slope, -self.slope, 0.0
+        falling = self.top * math.exp(-(x - self.flare_x) / self.length)
+        return falling - self.sink_height, -falling / self.length, falling / self.length**2
+
+    def speed(self, x: float) -> tuple[float, float]:
+        """Airspeed [m/s] and dV/dx [1/s]: V² falls linearly, so that the deceleration is constant in still air."""
+        if x <= self.flare_x or x >= self.touchdown_x:
+            return (self.approach, 0.0) if x <= self.flare_x else (self.touchdown, 0.0)
+        gradient = (self.touchdown**2 - self.approach**2) / (self.touchdown_x - self.flare_x)
+        V = math.sqrt(self.approach**2 + gradient * (x - self.flare_x))
+        return V, 0.5 * gradient / V
+
+
+@dataclass(frozen=True, slots=True)
+class Capture:
+    """Course over offset: a turn of constant radius that runs tangentially into course = -slope y."""
+
+    slope: float  # [rad/m] of the linear end
+    radius: float  # [m]
+    limit: float  # [rad] of the course
+
+    def course(self, y: float) -> tuple[float, float]:
+        """Course [rad] wanted at offset y [m] and its derivative [rad/m].
+
+        |y| <= y_l: -slope y;  beyond: -sgn(y) sqrt((2 |y| - y_l) / radius), with y_l = 1 / (slope² radius).
+        """
+        join = 1.0 / (self.slope**2 * self.radius)
+        size = abs(y)
+        if size <= join:
+            return -self.slope * y, -self.slope
+        course = math.sqrt((2.0 * size - join) / self.radius)
+        if course >= self.limit:
+            return -math.copysign(self.limit, y), 0.0
+        return -math.copysign(course, y), -1.0 / (self.radius * course)
+
+
+class LandingGuidance:
+    """interfaces.Guidance for an aircraft on wheels. Constants only; all memory is in GuidanceMemory."""
+
+    __slots__ = ("capture", "path", "settings")
+
+    def __init__(self, settings: GuidanceSettings, localizer_slope: float) -> None:
+        """localizer_slope [rad/m]: heading worth a metre of offset in the controller (PointDesign.localizer_slope)."""
+        if not localizer_slope > 0.0:
+            raise ValueError(f"localizer_slope must be positive, not {localizer_slope}")
+        self.settings = settings
+        self.path = Path.from_settings(settings.path)
+        c = settings.capture
+        radius = self.path.approach**2 / (GRAVITY * math.tan(math.radians(c.bank_deg)))
+        self.capture = Capture(localizer_slope, radius, math.radians(c.intercept_limit_deg))
+
+    def init(self) -> GuidanceMemory:
+        return GuidanceMemory()
+
+    def step(self, memory: GuidanceMemory, estimate: Estimate) -> tuple[GuidanceMemory, Reference]:
+        if memory.mode == "acquire" and not estimate.valid:
+            return replace(memory, t=estimate.t), Reference(
+                "acquire", self.path.approach, 0.0, -self.path.slope * self.path.approach, 0.0, 0.0, 0.0
+            )
+        b = believed(estimate)
+        m = motion(b)
+        wheels = _lowest_wheel(b, self.settings.gear)
+        mode, waiting = self._phase(memory, estimate, b, m, wheels)
+        dt = min(max(estimate.t - memory.t, 0.0), 1.0)
+        share = dt / (dt + self.settings.decrab.wind_filter_s) if math.isfinite(memory.seen) else 1.0
+        crosswind = memory.crosswind + share * (b.wy - memory.crosswind)
+        started = mode == "go_around" and memory.mode != mode
+        memory = GuidanceMemory(
+            mode,
+            estimate.t,
+            estimate.t if estimate.valid else memory.seen,
+            crosswind,
+            waiting,
+            b.H if started else memory.start_height,
+            estimate.t if started else memory.start,
+        )
+        if mode == "rollout" or mode == "stopped":
+            return memory, Reference(mode, 0.0, b.H, 0.0, 0.0, 0.0, 0.0)
+        if mode == "go_around":
+            return memory, self._go_around(memory, b, m)
+        return memory, self._approach(memory, b, m, wheels)
+
+    # ------------------------------------------------------------------------------------------------ references
+
+    def _approach(self, memory: GuidanceMemory, b: Believed, m: Motion, wheels: tuple[float, float]) -> Reference:
+        s, path = self.settings, self.path
+        height, wheel_x = wheels
+        H_path, slope, curvature = path.height(wheel_x)
+        V, V_slope = path.speed(wheel_x)
+        limit = s.path.height_error_limit_m
+        error = min(max(H_path - height, -limit), limit)
+        crab = -memory.crosswind / max(m.airspeed, 0.5 * path.touchdown)
+        d = s.decrab
+        aligned = d.fraction * min(max((d.start_height_m - height) / (d.start_height_m - d.end_height_m), 0.0), 1.0)
+        y, course, phi, r = 0.0, 0.0, 0.0, 0.0
+        if memory.mode == "capture":
+            # The law needs no offset error: course is a function of where the aircraft is.
+            y, (course, gradient) = b.y, self.capture.course(b.y)
+            bank_limit = math.radians(s.capture.bank_limit_deg)
+            phi = math.atan(gradient * m.y_dot * m.airspeed / GRAVITY)
+            phi = min(max(phi, -bank_limit), bank_limit)
+            r = GRAVITY * math.tan(phi) / max(m.airspeed, 1.0)
+        psi = course + (1.0 - aligned) * crab
+        if memory.mode == "capture":
+            off = math.radians(s.capture.heading_error_limit_deg)
+            psi = b.psi + min(max(psi - b.psi, -off), off)
+        extra: Mapping[str, float] = {
+            "acceleration": V_slope * m.x_dot,  # [m/s²] of the airspeed
+            "pull": curvature * m.x_dot * m.x_dot,  # [m/s²] of the path, > 0 upwards
+            "sideslip": -aligned * crab,  # [rad]
+        }
+        return Reference(memory.mode, V, b.H + error, slope * m.x_dot, y, psi, phi, 0.0, r, extra)
+
+    def _go_around(self, memory: GuidanceMemory, b: Believed, m: Motion) -> Reference:
+        climb = self.path.approach * math.sin(math.radians(self.settings.go_around.climb_deg))
+        height = memory.start_height + climb * (memory.t - memory.start)
+        limit = self.settings.path.height_error_limit_m
+        error = min(max(height - b.H, -limit), limit)
+        crab = -memory.crosswind / max(m.airspeed, 0.5 * self.path.touchdown)
+        return Reference("go_around", self.path.approach, b.H + error, climb, b.y, crab, 0.0)
+
+    # ------------------------------------------------------------------------------------------------ phases
+
+    def _phase(
+        self, memory: GuidanceMemory, estimate: Estimate, b: Believed, m: Motion, wheels: tuple[float, float]
+    ) -> tuple[str, float]:
+        """The phase now, and for how long [s] the next one has been suspected."""
+        s, mode = self.settings, memory.mode
+        dt = estimate.t - memory.t if math.isfinite(memory.t) else 0.0
+        height, wheel_x = wheels
+        if mode == "go_around" or mode == "stopped":
+            return mode, 0.0
+        if mode == "rollout":
+            return ("stopped" if math.hypot(m.x_dot, m.y_dot) < s.stopped_mps else mode), 0.0
+        down = estimate.flags.get("on_ground")
+        if down or (down is None and height <= s.touchdown_height_m):
+            waiting = memory.waiting + dt
+            if down or waiting >= s.touchdown_confirm_s:
+                return "rollout", 0.0
+            return mode, waiting
+        waiting = 0.0
+        g = s.go_around
+        if height > g.decision_height_m and mode != "acquire":
+            if not estimate.valid and estimate.t - memory.seen > g.blackout_s:
+                return "go_around", 0.0
+            if height < g.stable_by_m and self._unstable(b, m, wheels):
+                waiting = memory.waiting + dt
+                if waiting > g.unstable_s:
+                    return "go_around", 0.0
+        if mode in ("acquire", "capture") and abs(b.y) > s.capture.end_m:
+            mode = "capture"
+        elif height <= s.decrab.start_height_m:
+            mode = "decrab"
+        elif mode != "decrab":
+            mode = "flare" if wheel_x > self.path.flare_x else "glide"
+        return mode, waiting
+
+    def _unstable(self, b: Believed, m: Motion, wheels: tuple[float, float]) -> bool:
+        g = self.settings.go_around
+        height, wheel_x = wheels
+        return (
+            abs(b.y) > g.max_y_m
+            or abs(height - self.path.height(wheel_x)[0]) > g.max_height_error_m
+            or abs(m.airspeed - self.path.speed(wheel_x)[0]) > g.max_speed_error_mps
+        )
+
+
+def _lowest_wheel(b: Believed, gear: GearSettings) -> tuple[float, float]:
+    """Height [m] of the lower main wheel over the threshold plane, and x [m] of the mains."""
+    cth, sth = math.cos(b.theta), math.sin(b.theta)
+    drop = cth * (gear.down_m * math.cos(b.phi) + gear.side_m * abs(math.sin(b.phi))) - gear.forward_m * sth
+    return b.H - drop, b.x + (gear.forward_m * cth + gear.down_m * sth) * math.cos(b.psi)

@@ -1,0 +1,176 @@
+"""The landing controller: scheduled full-state feedback in the air, a yaw loop on the wheels, and the camera platform.
+
+In the air  u = u_ref - K (x - x_ref), longitudinal (u w q theta H int_V int_H) and lateral (v p r phi psi y) apart.
+u, v, w are velocities through the air, so that what acts on the wing is fed back, and the wind enters as a reference:
+theta_ref carries the updraught, psi_ref (from guidance) the crab. Gains and trim are interpolated over airspeed, those
+of the surfaces as moments (times V²).
+
+Source     Dickmanns & Schell 1992, section 6: state feedback with integral action on speed and altitude.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from landing_sim.control.believed import Believed, Motion, believed, motion
+from landing_sim.control.design import Design, PointDesign
+from landing_sim.control.pointing import look_along
+from landing_sim.control.rollout import Rollout
+from landing_sim.control.settings import ThrustSettings
+from landing_sim.control.tables import Schedule, interpolate
+from landing_sim.signals import Command, Estimate, Reference
+
+GRAVITY = 9.80665
+
+
+@dataclass(frozen=True, slots=True)
+class ControlMemory:
+    """Integrals and the commands of the last cycle, from which rates are limited."""
+
+    t: float = -math.inf
+    mode: str = "acquire"
+    int_V: float = 0.0  # [m]
+    int_H: float = 0.0  # [m s]
+    elevator: float = math.nan  # [rad]
+    aileron: float = 0.0
+    rudder: float = 0.0
+    attitude: float = 0.0  # [rad] asked for on the wheels
+    brake: float = 0.0
+
+
+class LandingController:
+    """interfaces.Controller. Constants only; all memory is in ControlMemory."""
+
+    __slots__ = ("_camera", "_flap", "_integral", "_limits", "_schedule", "_slowest", "_thrust", "_trim", "rollout")
+
+    def __init__(self, design: Design) -> None:
+        s = design.settings
+        points = sorted(design.points, key=lambda p: p.model.airspeed)
+        self._schedule = Schedule(tuple(p.model.airspeed for p in points), tuple(_row(p) for p in points))
+        self._slowest = 0.7 * points[0].model.airspeed
+        approach = design.points[0].model
+        self._thrust = ThrustMap(s.thrust)
+        self._trim = (float(approach.inputs[0]), self._thrust.throttle(float(approach.inputs[1]), approach.airspeed))
+        self._limits = tuple((math.radians(a.max_deg), math.radians(a.rate_dps))
+                             for a in (s.elevator, s.aileron, s.rudder))  # fmt: skip
+        self._integral = (s.integral_limits["int_V"], s.integral_limits["int_H"])
+        c = s.camera
+        self._camera = tuple(math.radians(a) for a in (c.elevation_deg, c.search_pan_deg, c.search_tilt_deg, c.max_deg))
+        self._flap = s.flap
+        self.rollout = Rollout(s.rollout)
+
+    def init(self) -> ControlMemory:
+        return ControlMemory()
+
+    def step(self, memory: ControlMemory, estimate: Estimate, reference: Reference) -> tuple[ControlMemory, Command]:
+        elevation, pan, tilt, most = self._camera
+        if reference.mode == "acquire":
+            if np.isfinite(estimate.mean).all():
+                pan, tilt = look_along(estimate["phi"], estimate["theta"], estimate["psi"], 0.0, elevation)
+            elevator, throttle = self._trim
+            return ControlMemory(estimate.t, "acquire", elevator=elevator), Command(
+                elevator, 0.0, 0.0, throttle, self._flap, 0.0, 0.0, _clip(pan, most), _clip(tilt, most)
+            )
+        b = believed(estimate)
+        m = motion(b)
+        pan, tilt = look_along(b.phi, b.theta, b.psi, 0.0, elevation)
+        dt = min(max(estimate.t - memory.t, 0.0), 0.5)
+        if reference.mode == "rollout" or reference.mode == "stopped":
+            elevator, aileron, rudder, left, right, attitude, brake = self.rollout.step(
+                b, m, reference, memory.attitude if memory.mode == reference.mode else b.theta, memory.brake, dt
+            )
+            throttle, int_V, int_H = 0.0, 0.0, 0.0
+        else:
+            elevator, throttle, aileron, rudder, int_V, int_H = self._fly(memory, b, m, reference, dt)
+            left = right = attitude = brake = 0.0
+        last = memory.elevator if memory.elevator == memory.elevator else elevator
+        elevator = _limited(elevator, last, dt, *self._limits[0])
+        aileron = _limited(aileron, memory.aileron, dt, *self._limits[1])
+        rudder = _limited(rudder, memory.rudder, dt, *self._limits[2])
+        return ControlMemory(
+            estimate.t, reference.mode, int_V, int_H, elevator, aileron, rudder, attitude, brake
+        ), Command(elevator, aileron, rudder, throttle, self._flap, left, right, _clip(pan, most), _clip(tilt, most))
+
+    def _fly(
+        self, memory: ControlMemory, b: Believed, m: Motion, ref: Reference, dt: float
+    ) -> tuple[float, float, float, float, float, float]:
+        """elevator [rad], throttle, aileron, rudder [rad], int_V, int_H."""
+        extra = ref.extra.get
+        V = max(m.airspeed, self._slowest)
+        (ke_u, ke_w, ke_q, ke_th, ke_H, ke_iV, ke_iH, kt_u, kt_w, kt_q, kt_th, kt_H, kt_iV, kt_iH,
+         ka_v, ka_p, ka_r, ka_ph, ka_ps, ka_y, kr_v, kr_p, kr_r, kr_ph, kr_ps, kr_y,
+         alpha, elevator0, thrust0, path0, mass, w_pull, el_pull, ph_slip, a_slip, r_slip, a_turn, r_turn,
+         ) = self._schedule(V)  # fmt: skip
+        per_q = 1.0 / (V * V)
+        # What the reference asks for: a flight path through the air, its curvature, a speed and its change.
+        path = (ref.climb_rate + b.wz) / V
+        q_ref = extra("pull", 0.0) / V
+        e_u = m.u_air - ref.airspeed * math.cos(alpha)
+        e_w = m.w_air - ref.airspeed * math.sin(alpha) - w_pull * q_ref
+        e_q = b.q - q_ref
+        e_th = b.theta - (alpha + path + ref.theta_ff + w_pull * q_ref / V)
+        e_H = b.H - ref.height
+        e_V = m.airspeed - ref.airspeed
+        int_V = _clip(memory.int_V + e_V * dt, self._integral[0])
+        int_H = _clip(memory.int_H + e_H * dt, self._integral[1])
+        elevator = elevator0 + el_pull * q_ref - per_q * (
+            ke_u * e_u + ke_w * e_w + ke_q * e_q + ke_th * e_th + ke_H * e_H + ke_iV * int_V + ke_iH * int_H
+        )
+        thrust = thrust0 + mass * (GRAVITY * (path - path0) + extra("acceleration", 0.0)) - (
+            kt_u * e_u + kt_w * e_w + kt_q * e_q + kt_th * e_th + kt_H * e_H + kt_iV * int_V + kt_iH * int_H
+        )
+        throttle = self._thrust.throttle(thrust, V)
+        # An integral whose actuator is at its end must not run on into it.
+        if not 0.0 <= throttle <= 1.0:
+            int_V = memory.int_V if (throttle > 1.0) == (e_V < 0.0) else int_V
+            throttle = min(max(throttle, 0.0), 1.0)
+        if abs(elevator) > self._limits[0][0]:
+            int_H = memory.int_H
+        slip = V * extra("sideslip", 0.0)
+        e_v = m.v_air - slip
+        e_r = b.r - ref.r_ff
+        e_ph = b.phi - ref.phi - ph_slip * slip
+        e_ps = math.remainder(b.psi - ref.psi, 2.0 * math.pi)
+        e_y = b.y - ref.y
+        aileron = a_slip * slip + a_turn * ref.r_ff - per_q * (
+            ka_v * e_v + ka_p * b.p + ka_r * e_r + ka_ph * e_ph + ka_ps * e_ps + ka_y * e_y
+        )
+        rudder = r_slip * slip + r_turn * ref.r_ff - per_q * (
+            kr_v * e_v + kr_p * b.p + kr_r * e_r + kr_ph * e_ph + kr_ps * e_ps + kr_y * e_y
+        )
+        return elevator, throttle, aileron, rudder, int_V, int_H
+
+
+@dataclass(frozen=True, slots=True)
+class ThrustMap:
+    """Throttle for a thrust of all engines [N] at an airspeed: idle to full, linear; outside 0..1 where none will do."""
+
+    settings: ThrustSettings
+
+    def throttle(self, thrust: float, V: float) -> float:
+        s = self.settings
+        idle, full = interpolate(V, s.airspeed_mps, s.idle_n), interpolate(V, s.airspeed_mps, s.full_n)
+        return (thrust - idle) / (full - idle)
+
+
+def _row(point: PointDesign) -> np.ndarray:
+    """What is scheduled, in the order in which _fly unpacks it."""
+    m = point.model
+    V2 = m.airspeed**2
+    K, G = point.longitudinal.solution.K, point.lateral.solution.K
+    alpha = math.atan2(m.state[2], m.state[0])
+    trim = [alpha, m.inputs[0], m.inputs[1], m.flight_path, m.mass]
+    return np.concatenate([K[0] * V2, K[1], G[0] * V2, G[1] * V2, trim, point.pull, point.sideslip, point.turn])
+
+
+def _clip(value: float, limit: float) -> float:
+    return min(max(value, -limit), limit)
+
+
+def _limited(value: float, last: float, dt: float, limit: float, rate: float) -> float:
+    """Within ±limit and within rate dt of the last value."""
+    value = min(max(value, last - rate * dt), last + rate * dt) if dt > 0.0 else value
+    return min(max(value, -limit), limit)

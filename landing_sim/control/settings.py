@@ -1,0 +1,279 @@
+"""What the sections `control:` and `guidance:` of an aircraft's vehicle.yaml mean. Angles in degrees here, and only here.
+
+Plain dataclasses: the reader of vehicle.yaml builds and checks them by their type hints; every __post_init__ raises
+ValueError on numbers that cannot be flown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+_STRICT = {"extra": "forbid"}  # for readers that build dataclasses by type hints (pydantic): unknown keys are errors
+
+
+def _increasing(name: str, values: Sequence[float]) -> None:
+    if len(values) < 2 or any(b <= a for a, b in pairwise(values)):
+        raise ValueError(f"{name} must be two or more increasing numbers, not {list(values)}")
+
+
+def _positive(**values: float) -> None:
+    for name, value in values.items():
+        if not value > 0.0:
+            raise ValueError(f"{name} must be positive, not {value}")
+
+
+@dataclass(frozen=True, slots=True)
+class TrimPointSettings:
+    """A flight condition to design for. Gains are scheduled over airspeed."""
+
+    airspeed_mps: float
+    flight_path_deg: float
+
+    __pydantic_config__ = _STRICT
+
+
+@dataclass(frozen=True, slots=True)
+class ModeSettings:
+    """A wanted mode: eigenvalue real ± imag·j [1/s] and the ratios of the eigenvector's components that matter."""
+
+    name: str
+    real: float
+    imag: float = 0.0
+    shape: dict[str, float] = field(default_factory=dict)
+
+    __pydantic_config__ = _STRICT
+
+    def __post_init__(self) -> None:
+        if self.real >= 0.0 or self.imag < 0.0:
+            raise ValueError(f"mode {self.name!r}: real must be negative and imag 0 or more")
+
+
+@dataclass(frozen=True, slots=True)
+class AxisSettings:
+    """One half of the aircraft. States u w q theta H int_V int_H or v p r phi psi y; m, m/s, rad, s.
+
+    `typical` sizes scale the states when eigenvectors are fitted; `tolerance` (default: typical) makes the weights Q0 of
+    the plain LQ part; `authority` is the use of each input [deg, N] worth as much as a tolerance.
+    """
+
+    modes: tuple[ModeSettings, ...]
+    typical: dict[str, float]
+    authority: dict[str, float]
+    rho: float
+    tolerance: dict[str, float] = field(default_factory=dict)
+
+    __pydantic_config__ = _STRICT
+
+    def __post_init__(self) -> None:
+        _positive(**self.typical, **self.authority, **self.tolerance)
+        if self.rho < 0.0:
+            raise ValueError("rho must be 0 or more")
+
+
+@dataclass(frozen=True, slots=True)
+class ThrustSettings:
+    """Believed thrust of all engines together at idle and at full throttle over airspeed; lag of the engines."""
+
+    airspeed_mps: tuple[float, ...]
+    idle_n: tuple[float, ...]
+    full_n: tuple[float, ...]
+    lag_s: float
+
+    __pydantic_config__ = _STRICT
+
+    def __post_init__(self) -> None:
+        _increasing("thrust.airspeed_mps", self.airspeed_mps)
+        if not len(self.airspeed_mps) == len(self.idle_n) == len(self.full_n):
+            raise ValueError("thrust: airspeed_mps, idle_n and full_n must be equally long")
+        if any(full <= idle for idle, full in zip(self.idle_n, self.full_n)):
+            raise ValueError("thrust: full_n must exceed idle_n")
+
+
+@dataclass(frozen=True, slots=True)
+class LimitSettings:
+    """Believed limits of one control surface, about zero."""
+
+    max_deg: float
+    rate_dps: float
+    lag_s: float
+
+    __pydantic_config__ = _STRICT
+
+    def __post_init__(self) -> None:
+        _positive(max_deg=self.max_deg, rate_dps=self.rate_dps)
+
+
+@dataclass(frozen=True, slots=True)
+class RolloutSettings:
+    """On the wheels: attitude and elevator over groundspeed, steering, brakes.
+
+    elevator = schedule + attitude_gain (theta - schedule) + pitch_rate_gain q; the attitude asked for slews from the
+    one at touchdown at attitude_rate_dps. Heading asked for: -y_gain y, limited. Steering u = heading_gain error -
+    yaw_rate_gain r [rad]; rudder -u, and brakes ± brake_steering u. Surface gains are for steering_mps and grow with
+    its square over airspeed's as far as the limits go.
+    """
+
+    groundspeed_mps: tuple[float, ...]
+    attitude_deg: tuple[float, ...]
+    elevator_deg: tuple[float, ...]
+    brake: tuple[float, ...]
+    attitude_rate_dps: float
+    attitude_gain: float
+    pitch_rate_gain_s: float
+    roll_gain: float
+    roll_rate_gain_s: float
+    y_gain_deg_per_m: float
+    heading_limit_deg: float
+    heading_gain: float
+    yaw_rate_gain_s: float
+    brake_steering_per_deg: float
+    steering_mps: float
+    brake_rate_per_s: float = 0.5
+
+    __pydantic_config__ = _STRICT
+
+    def __post_init__(self) -> None:
+        _increasing("rollout.groundspeed_mps", self.groundspeed_mps)
+        n = len(self.groundspeed_mps)
+        if not n == len(self.attitude_deg) == len(self.elevator_deg) == len(self.brake):
+            raise ValueError("rollout: groundspeed_mps, attitude_deg, elevator_deg and brake must be equally long")
+
+
+@dataclass(frozen=True, slots=True)
+class CameraSettings:
+    """Where the platform looks: the runway's direction, raised by elevation_deg; before acquisition, these angles."""
+
+    elevation_deg: float = 0.0
+    search_pan_deg: float = 0.0
+    search_tilt_deg: float = 0.0
+    max_deg: float = 60.0
+
+    __pydantic_config__ = _STRICT
+
+
+@dataclass(frozen=True, slots=True)
+class ControlSettings:
+    """Section `control:`."""
+
+    trim_points: tuple[TrimPointSettings, ...]
+    flap: float
+    loop_delay_s: float  # computing, hold and transport delay that margins are quoted with
+    longitudinal: AxisSettings
+    lateral: AxisSettings
+    thrust: ThrustSettings
+    elevator: LimitSettings
+    aileron: LimitSettings
+    rudder: LimitSettings
+    integral_limits: dict[str, float]  # int_V [m], int_H [m s]
+    rollout: RolloutSettings
+    camera: CameraSettings = CameraSettings()
+
+    __pydantic_config__ = _STRICT
+
+    def __post_init__(self) -> None:
+        _increasing("control.trim_points airspeed_mps", sorted(p.airspeed_mps for p in self.trim_points))
+        if set(self.integral_limits) != {"int_V", "int_H"}:
+            raise ValueError("integral_limits needs exactly int_V and int_H")
+
+
+@dataclass(frozen=True, slots=True)
+class GearSettings:
+    """Main wheels at rest, from the cg: forward, to the side, down [m]."""
+
+    forward_m: float
+    side_m: float
+    down_m: float
+
+    __pydantic_config__ = _STRICT
+
+
+@dataclass(frozen=True, slots=True)
+class PathSettings:
+    """Glide and flare of the main wheels: H = (flare_height + sink_height) exp(-s/L) - sink_height to touchdown_x."""
+
+    glide_deg: float
+    flare_height_m: float  # of the wheels, where glide and flare meet
+    sink_height_m: float  # how far below the surface the flare aims: more is firmer and hits the spot better
+    touchdown_x_m: float
+    approach_mps: float
+    touchdown_mps: float
+    height_error_limit_m: float  # larger deviations are flown back at this one's rate
+
+    __pydantic_config__ = _STRICT
+
+    def __post_init__(self) -> None:
+        _positive(
+            glide_deg=self.glide_deg,
+            flare_height_m=self.flare_height_m,
+            sink_height_m=self.sink_height_m,
+            height_error_limit_m=self.height_error_limit_m,
+            touchdown_mps=self.touchdown_mps,
+        )
+        if self.approach_mps < self.touchdown_mps:
+            raise ValueError("approach_mps must not be below touchdown_mps")
+
+
+@dataclass(frozen=True, slots=True)
+class CaptureSettings:
+    """Tangential capture of the centreline by a turn at constant bank; bank stays within the limit."""
+
+    bank_deg: float
+    bank_limit_deg: float
+    intercept_limit_deg: float
+    end_m: float  # |y| below which the linear law takes over
+    heading_error_limit_deg: float
+
+    __pydantic_config__ = _STRICT
+
+    def __post_init__(self) -> None:
+        _positive(bank_deg=self.bank_deg, end_m=self.end_m, intercept_limit_deg=self.intercept_limit_deg)
+
+
+@dataclass(frozen=True, slots=True)
+class DecrabSettings:
+    """Heading moves from crab to the runway's between these heights of the wheels, with the wing low that it takes."""
+
+    start_height_m: float
+    end_height_m: float
+    fraction: float = 1.0
+    wind_filter_s: float = 1.0
+
+    __pydantic_config__ = _STRICT
+
+    def __post_init__(self) -> None:
+        if not self.start_height_m > self.end_height_m >= 0.0:
+            raise ValueError("decrab: start_height_m must be above end_height_m")
+
+
+@dataclass(frozen=True, slots=True)
+class GoAroundSettings:
+    """When an approach is given up. Below decision_height_m it is always continued."""
+
+    decision_height_m: float
+    stable_by_m: float
+    max_y_m: float
+    max_height_error_m: float
+    max_speed_error_mps: float
+    unstable_s: float
+    blackout_s: float
+    climb_deg: float
+
+    __pydantic_config__ = _STRICT
+
+
+@dataclass(frozen=True, slots=True)
+class GuidanceSettings:
+    """Section `guidance:`."""
+
+    gear: GearSettings
+    path: PathSettings
+    capture: CaptureSettings
+    decrab: DecrabSettings
+    go_around: GoAroundSettings
+    touchdown_height_m: float  # estimated wheel height that counts as touchdown, if the estimate has no flag on_ground
+    touchdown_confirm_s: float
+    stopped_mps: float = 0.5
+
+    __pydantic_config__ = _STRICT
