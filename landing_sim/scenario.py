@@ -14,9 +14,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from landing_sim import paths, yamlfile
+from landing_sim import config, paths, yamlfile
+from landing_sim.config import Section, inconsistent
 from landing_sim.errors import ConfigError, Location, Problem, ScenarioError, did_you_mean
-from landing_sim.yamlfile import Section, inconsistent
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
@@ -61,9 +61,9 @@ class Taxiway(Section):
     """An exit: the runway's edge is missing along its mouth."""
 
     x_m: float = Field(description="middle of the mouth, from the threshold")
-    width_m: Positive = Field(15.0, description="width of the taxiway")
+    width_m: Positive = Field(12.0, description="width of the taxiway")
     side: Literal["left", "right"] = Field(description="side of the runway it leaves to")
-    flare_m: NotNegative = Field(10.0, description="how far its rounded corners reach along the runway's edge")
+    flare_m: float = Field(12.0, ge=0, lt=100, description="its mouth widens by this to each side, at 45 degrees")
     mapped: bool = Field(True, description="known on board, so that windows on the mouth are dropped")
 
 
@@ -73,7 +73,7 @@ class GreyLevels(Section):
     grass: Grey = Field(90.0, description="ground beside the runway")
     surface: Grey = Field(145.0, description="the runway's surface")
     marking: Grey = Field(215.0, description="painted markings")
-    sky: Grey = Field(190.0, description="above the horizon")
+    sky: Grey = Field(180.0, description="above the horizon")
 
 
 class Runway(Section):
@@ -87,6 +87,7 @@ class Runway(Section):
     latitude_deg: float = Field(52.32, ge=-85, le=85, description="threshold, WGS 84")
     longitude_deg: float = Field(10.55, ge=-180, le=180, description="threshold, WGS 84")
     markings: bool = Field(True, description="paint ICAO markings")
+    side_stripes: bool = Field(False, description="paint side stripes too; what is measured is the edge to the grass")
     taxiways: tuple[Taxiway, ...] = Field((), max_length=20, description="exits that break the borderlines")
     grey: GreyLevels = Field(GreyLevels(), description="brightness of the scene")
 
@@ -121,9 +122,9 @@ class Wind(Section):
 class Platform(Section):
     """The two-axis camera mount."""
 
-    lag_s: NotNegative = Field(0.05, description="time constant of its servo")
+    lag_s: NotNegative = Field(0.08, description="time constant of its servo")
     rate_limit_dps: Positive = Field(60.0, description="fastest it turns")
-    stabilisation: bool = Field(True, description="inertial rate feedback holds the line of sight between commands")
+    stabilisation: float = Field(0.95, ge=0, le=1, description="inertial rate feedback: 0 none, 1 perfect")
     encoder_bias_deg: float = Field(0.03, ge=-5, le=5, description="constant error of both angle readings")
     encoder_noise_deg: NotNegative = Field(0.005, description="1 sigma, each reading")
     encoder_skew_s: float = Field(0.0, ge=0, le=1, description="angle readings are older than the image by this")
@@ -135,9 +136,10 @@ class Camera(Section):
     width_px: int = Field(512, ge=64, le=4096, description="image width")
     height_px: int = Field(512, ge=64, le=4096, description="image height")
     focal_px: float = Field(2000.0, ge=50, le=50000, description="focal length in pixels")
-    blur_px: float = Field(0.7, ge=0, le=10, description="optical blur, 1 sigma of a Gaussian")
+    blur_px: float = Field(0.7, ge=0.3, le=20, description="optical blur, 1 sigma, the pixel's own aperture included")
     noise_dn: float = Field(4.0, ge=0, le=100, description="noise of a pixel, 1 sigma in grey levels")
-    exposure: float = Field(1.0, ge=0.05, le=20, description="factor on all grey levels before they clip at 255")
+    gain: float = Field(1.0, gt=0, le=20, description="factor on all grey levels before they clip at 255")
+    exposure_s: float = Field(0.0, ge=0, le=0.1, description="shutter time, centred on the time stamp: motion blur")
     period_s: Positive = Field(0.06, description="time between frames")
     latency_s: float = Field(0.0, ge=0, le=2, description="age of an image when the computer gets it")
     renderer: Literal["exact", "line_aa", "line_8"] = Field(
@@ -171,7 +173,7 @@ class Vision(Section):
 
     windows: str = Field(
         "3L3R2T2H",
-        pattern=r"^[0-9]L[0-9]R[0-9]T[0-9]H$",
+        pattern=r"^[0-9]{1,2}L[0-9]{1,2}R([0-9]{1,2}T)?[0-9]{1,2}H$",
         description="windows on left, right borderline, threshold, horizon; a lost threshold's move to the borderlines",
     )
     platform_angle: Literal["encoder", "commanded"] = Field("encoder", description="which platform angles are believed")
@@ -185,6 +187,9 @@ class Filter(Section):
     )
     factorisation: Literal["dense", "ud"] = Field(
         "dense", description="full covariance, or Bierman's sequential U-D update"
+    )
+    process_noise: Literal["integrated", "constant"] = Field(
+        "integrated", description="eq. (9), or the constant matrix of eqs. (13), (14)"
     )
     width: Literal["known", "state", "separate"] = Field(
         "known", description="runway width: believed, estimated, or by a second filter"
@@ -308,8 +313,15 @@ class Scenario(Section):
             problems.append((("wind", "turbulence"), "give one of severity and wind_at_20ft_mps"))
         length = self.runway.length_m
         for i, taxiway in enumerate(self.runway.taxiways):
-            if not 0 <= taxiway.x_m <= length:
-                problems.append((("runway", "taxiways", i, "x_m"), f"lies off the runway (0 ... {length:g})"))
+            half = 0.5 * taxiway.width_m + taxiway.flare_m
+            if not half <= taxiway.x_m <= length - half:
+                problems.append(
+                    (("runway", "taxiways", i, "x_m"), f"its mouth reaches past the runway (0 ... {length:g})")
+                )
+        if self.camera.exposure_s > 0 and self.camera.renderer != "exact":
+            problems.append(
+                (("camera", "exposure_s"), f"renderer {self.camera.renderer!r} has no motion blur: must be 0")
+            )
         for i, limit in enumerate(self.criteria):
             if limit.low is None and limit.high is None:
                 problems.append((("criteria", i), "needs low, high or both"))
@@ -337,10 +349,10 @@ def load(name: str | Path, overrides: Iterable[str] = ()) -> Scenario:
     try:
         path = paths.scenario_file(str(name))
         document = yamlfile.load(path)
-        yamlfile.override(document, overrides)
+        config.override(document, overrides)
         if document.data.get("name") in (None, ""):
             document.data["name"] = path.stem
-        scenario = yamlfile.validate(document, Scenario)
+        scenario = config.validate(document, Scenario)
         if scenario.aircraft.model not in paths.aircraft_names():
             where: Location = ("aircraft", "model")
             near = did_you_mean(scenario.aircraft.model, paths.aircraft_names())

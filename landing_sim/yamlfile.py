@@ -1,4 +1,4 @@
-"""YAML files into plain data, remembering where every value stands, and into pydantic models.
+"""YAML files into plain data, remembering where every value stands.
 
 Built on the events of ruamel's parser rather than its constructors: nothing but mappings, lists and YAML 1.2 core
 scalars can come out (``on`` is a string, ``1e3`` a number), and limits are met while reading. Tags, anchors and
@@ -8,12 +8,11 @@ aliases are refused. Sequences become tuples, so that models stay frozen.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import (
@@ -27,7 +26,7 @@ from ruamel.yaml.events import (
     SequenceStartEvent,
 )
 
-from landing_sim.errors import ConfigError, Location, Mark, Problem, did_you_mean
+from landing_sim.errors import ConfigError, Location, Mark, Problem
 
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 20
@@ -39,15 +38,6 @@ _CONSTANTS = {"": None, "~": None} | {
     for name, value in (("null", None), ("true", True), ("false", False))
     for word in (name, name.capitalize(), name.upper())
 }
-
-
-class Section(BaseModel):
-    """A frozen part of a file: unknown keys, loose types, NaN and infinity are errors."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
-
-S = TypeVar("S", bound=Section)
 
 
 @dataclass(slots=True)
@@ -102,7 +92,7 @@ def parse(text: str, source: str) -> Document:
     document = Document(source)
     data = _build(text, document)
     if not isinstance(data, dict):
-        found = "empty" if data is None else f"a {_kind(data)}"
+        found = "empty" if data is None else f"a {kind_of(data)}"
         raise ConfigError([Problem(Mark(source), (), f"must hold a mapping of keys to values, but is {found}")])
     document.data = data
     return document
@@ -236,134 +226,8 @@ class _Builder:
         raise ConfigError([Problem(self._mark(event), at, message)])
 
 
-def override(document: Document, assignments: Iterable[str]) -> None:
-    """Apply `path=value` strings, as given with --set, onto a document. Raises ConfigError, for all of them at once."""
-    problems: list[Problem] = []
-    for assignment in assignments:
-        path, equals, text = assignment.partition("=")
-        mark = Mark(f"--set {path}")
-        keys = [part.strip() for part in path.split(".")]
-        if not equals or not all(keys):
-            problems.append(Problem(mark, (), "must look like path.to.key=value"))
-            continue
-        try:
-            value = parse_value(text, mark.source)
-        except ConfigError as error:
-            problems += [Problem(mark, tuple(keys), problem.message) for problem in error.problems]
-            continue
-        problem = _assign(document, keys, value, mark)
-        if problem:
-            problems.append(problem)
-    if problems:
-        raise ConfigError(problems)
-
-
-def _assign(document: Document, keys: list[str], value: Any, mark: Mark) -> Problem | None:
-    if len(keys) > MAX_DEPTH:
-        return Problem(mark, (), f"nested deeper than {MAX_DEPTH} levels")
-    location: Location = ()
-
-    def put(node: Any, rest: list[str]) -> Any:
-        nonlocal location
-        if not rest:
-            return value
-        key: str | int = rest[0]
-        if isinstance(node, tuple):
-            if not rest[0].isdecimal() or int(rest[0]) >= len(node):
-                raise LookupError(f"the list has {len(node)} items, counted from 0")
-            key = int(rest[0])
-            location = (*location, key)
-            return (*node[:key], put(node[key], rest[1:]), *node[key + 1 :])
-        if node is not None and not isinstance(node, dict):
-            raise LookupError(f"is a {_kind(node)}, which has no key {key!r}")
-        location = (*location, key)
-        return {**(node or {}), key: put((node or {}).get(key), rest[1:])}
-
-    try:
-        document.data = put(document.data, keys)
-    except LookupError as error:
-        return Problem(mark, location, str(error.args[0]))
-    for marks in (document.keys, document.values):
-        for old in [known for known in marks if known[: len(location)] == location]:
-            del marks[old]
-        # Parents that --set brought into being have no other place to point at.
-        for depth in range(1, len(location) + 1):
-            marks.setdefault(location[:depth], mark)
-    return None
-
-
-def validate(document: Document, model: type[S]) -> S:
-    """The document as a `model`. Raises ConfigError with every problem and its place."""
-    try:
-        return model.model_validate(document.data)
-    except ValidationError as error:
-        raise ConfigError(_problems(document, model, error)) from None
-
-
-def _problems(document: Document, model: type[Section], error: ValidationError) -> list[Problem]:
-    out: list[Problem] = []
-    for item in error.errors(include_url=False):
-        location: Location = tuple(item["loc"])
-        kind, context = item["type"], item.get("ctx", {})
-        if kind == "inconsistent":  # see `inconsistent`
-            out += [Problem(document.mark(where), where, text) for where, text in context["problems"]]
-        elif kind == "extra_forbidden":
-            near = did_you_mean(str(location[-1]), _fields(model, location[:-1]))
-            out.append(Problem(document.mark(location, key=True), location, f"unknown key{near}"))
-        elif kind == "missing":
-            out.append(Problem(document.mark(location[:-1], key=True), location, "missing: this key is required"))
-        elif kind == "literal_error":
-            near = did_you_mean(str(item["input"]), re.findall(r"'([^']*)'", context["expected"]))
-            text = f"must be {context['expected']}, not {_show(item['input'])}{near}"
-            out.append(Problem(document.mark(location), location, text))
-        elif kind == "finite_number":
-            out.append(
-                Problem(document.mark(location), location, f"must be a finite number, not {_show(item['input'])}")
-            )
-        else:
-            text = (
-                item["msg"].replace("Input should be", "must be").replace("a valid dictionary or instance", "a mapping")
-            )
-            text = re.sub(r"^Value error, ", "", text)
-            out.append(Problem(document.mark(location), location, f"{text}, not {_show(item['input'])}"))
-    return sorted(out, key=lambda problem: (problem.mark.source, problem.mark.line, problem.mark.column))
-
-
-def inconsistent(problems: list[tuple[Location, str]]) -> None:
-    """For a model's validator: raise for values that are each fine but do not fit together; nothing if there are none.
-
-    `problems` are (location from the top of the file, message).
-    """
-    from pydantic_core import PydanticCustomError
-
-    if problems:
-        text = "; ".join(f"{'.'.join(map(str, where))}: {message}" for where, message in problems)
-        raise PydanticCustomError("inconsistent", "{text}", {"text": text, "problems": problems})
-
-
-def _fields(model: Any, location: Location) -> list[str]:
-    """Names of the keys known at a location of a model."""
-    for key in location:
-        if isinstance(key, int):
-            continue
-        field_info = getattr(model, "model_fields", {}).get(key)
-        if field_info is None:
-            return []
-        model = _model_in(field_info.annotation)
-    return list(getattr(model, "model_fields", {}))
-
-
-def _model_in(annotation: Any) -> Any:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for part in getattr(annotation, "__args__", ()):
-        found = _model_in(part)
-        if found is not None:
-            return found
-    return None
-
-
-def _kind(value: Any) -> str:
+def kind_of(value: Any) -> str:
+    """What a value is called in messages."""
     if isinstance(value, dict):
         return "mapping"
     if isinstance(value, list | tuple):
@@ -373,12 +237,3 @@ def _kind(value: Any) -> str:
     if isinstance(value, int | float):
         return "number"
     return "text" if isinstance(value, str) else "null"
-
-
-def _show(value: Any) -> str:
-    if isinstance(value, dict | list | tuple):
-        return f"a {_kind(value)}"
-    if value is None or isinstance(value, bool):
-        return {None: "null", True: "true", False: "false"}[value]
-    text = repr(value)
-    return text if len(text) <= 40 else text[:37] + "..."
