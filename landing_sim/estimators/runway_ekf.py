@@ -52,6 +52,7 @@ class FilterConfig:
     q_ground_rates: float = 6.0 * RAD
     start_frames: int = 8  # iterated, robust, ungated
     start_iterations: int = 4
+    start_rates: float = 4.0  # the delayed downwash is not known yet: q_rates times this while starting
     huber: float = 2.0
     watchdog_share: float = 0.35  # smoothed share of rejected edges that means "locked out"
     watchdog_memory: float = 5.0  # frames
@@ -137,9 +138,11 @@ class RunwayEkf:
         ground = q.copy()
         ground[:3] = config.q_ground_velocity**2
         ground[3:6] = config.q_ground_rates**2
-        self._q_air, self._q_ground = q[self.blocks.index], ground[self.blocks.index]
+        start = q.copy()
+        start[3:6] *= config.start_rates**2
+        self._q = {name: d[self.blocks.index] for name, d in (("air", q), ("ground", ground), ("start", start))}
         self._prior = self._prior_variance()
-        self._constant_Q: dict[tuple[bool, int], Array] = {}
+        self._constant_Q: dict[tuple[str, int], Array] = {}
 
     # ------------------------------------------------------------------------------------------- interface
 
@@ -162,7 +165,8 @@ class RunwayEkf:
         Phi15 = np.empty((15, 15))
         propagate(x, shadow, u, self._par, memory.on_ground, dt, Phi15)
         Phi = kalman.expand(Phi15, self.blocks.index)
-        Qd = self._process_noise(Phi, dt, memory.on_ground)
+        phase = "ground" if memory.on_ground else "start" if memory.frames < self.config.start_frames else "air"
+        Qd = self._process_noise(Phi, dt, phase)
         P, D = memory.P, memory.D
         if D is None:
             P = kalman.predict_dense(P, Phi, Qd, self.blocks.starts)
@@ -241,7 +245,7 @@ class RunwayEkf:
         if states.EPAN in idx:
             for angle, bias in ((states.PSI, states.EPAN), (states.THETA, states.ETILT)):
                 P[angle, angle] += var[bias]
-                P[angle, bias] = P[bias, angle] = -var[bias]
+                P[angle, bias] = P[bias, angle] = var[bias]
         P = P[np.ix_(idx, idx)]
         for lo, hi in zip(self.blocks.starts, self.blocks.starts[1:]):
             P[lo:hi, :lo] = 0.0
@@ -259,10 +263,10 @@ class RunwayEkf:
 
     # ------------------------------------------------------------------------------------------- updates
 
-    def _process_noise(self, Phi: Array, dt: float, on_ground: bool) -> Array:
-        q = self._q_ground if on_ground else self._q_air
+    def _process_noise(self, Phi: Array, dt: float, phase: str) -> Array:
+        q = self._q[phase]
         if self.config.process_noise == "constant":
-            key = (on_ground, round(dt * 1e6))
+            key = (phase, round(dt * 1e6))
             if key not in self._constant_Q:
                 self._constant_Q[key] = np.diag(q * dt)
             return self._constant_Q[key]

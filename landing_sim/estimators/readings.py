@@ -1,0 +1,20 @@
+"""Front ends that need no processing: a reading becomes a measurement with a believed noise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from landing_sim.signals import Estimate, Measurement, Sample
+
+
+class Reading:
+    """The samples of `sensor` as measurements of `kind` (interfaces.FrontEnd), `sigma` 1 sigma in the sample's unit."""
+
+    def __init__(self, sensor: str, kind: str, sigma: float) -> None:
+        self.sensor = sensor
+        self.kind = kind
+        self.variance = sigma * sigma
+
+    def process(self, sample: Sample, estimate: Estimate) -> tuple[Measurement, ...]:
+        z = np.atleast_1d(np.asarray(sample.data, dtype=float))
+        return (Measurement(self.kind, sample.t_valid, sample.t_arrival, z, np.full(z.shape, self.variance)),)
