@@ -76,12 +76,6 @@ class PointDesign:
     turn: Array  # (2,)
     pull: Array  # (2,)
 
-    @property
-    def localizer_slope(self) -> float:
-        """Heading [rad] worth a metre of offset in the lateral law: the slope of the linear end of the capture."""
-        K = self.lateral.solution.K
-        return float(K[0, LATERAL.index("y")] / K[0, LATERAL.index("psi")])
-
 
 @dataclass(frozen=True, slots=True)
 class Design:
@@ -209,7 +203,6 @@ def _point_dict(point: PointDesign) -> dict[str, Any]:
         "theta_deg": math.degrees(m.state[7]),
         "elevator_deg": math.degrees(m.inputs[0]),
         "thrust_n": float(m.inputs[1]),
-        "localizer_slope_deg_per_m": math.degrees(point.localizer_slope),
         "longitudinal": _axis_dict(point.longitudinal),
         "lateral": _axis_dict(point.lateral),
     }

@@ -74,22 +74,22 @@ class Path:
 
 @dataclass(frozen=True, slots=True)
 class Capture:
-    """Course over offset: a turn of constant radius that runs tangentially into course = -slope y."""
+    """Course over offset: a turn of constant radius that runs tangentially into a course proportional to the offset."""
 
-    slope: float  # [rad/m] of the linear end
+    join: float  # [m] |y| where the turn meets the linear end
     radius: float  # [m]
     limit: float  # [rad] of the course
 
     def course(self, y: float) -> tuple[float, float]:
         """Course [rad] wanted at offset y [m] and its derivative [rad/m].
 
-        |y| <= y_l: -slope y;  beyond: -sgn(y) sqrt((2 |y| - y_l) / radius), with y_l = 1 / (slope² radius).
+        |y| <= join: -y / sqrt(join radius);  beyond: -sgn(y) sqrt((2 |y| - join) / radius).
         """
-        join = 1.0 / (self.slope**2 * self.radius)
         size = abs(y)
-        if size <= join:
-            return -self.slope * y, -self.slope
-        course = math.sqrt((2.0 * size - join) / self.radius)
+        if size <= self.join:
+            slope = 1.0 / math.sqrt(self.join * self.radius)
+            return -slope * y, -slope
+        course = math.sqrt((2.0 * size - self.join) / self.radius)
         if course >= self.limit:
             return -math.copysign(self.limit, y), 0.0
         return -math.copysign(course, y), -1.0 / (self.radius * course)
@@ -100,15 +100,12 @@ class LandingGuidance:
 
     __slots__ = ("capture", "path", "settings")
 
-    def __init__(self, settings: GuidanceSettings, localizer_slope: float) -> None:
-        """localizer_slope [rad/m]: heading worth a metre of offset in the controller (PointDesign.localizer_slope)."""
-        if not localizer_slope > 0.0:
-            raise ValueError(f"localizer_slope must be positive, not {localizer_slope}")
+    def __init__(self, settings: GuidanceSettings) -> None:
         self.settings = settings
         self.path = Path.from_settings(settings.path)
         c = settings.capture
         radius = self.path.approach**2 / (GRAVITY * math.tan(math.radians(c.bank_deg)))
-        self.capture = Capture(localizer_slope, radius, math.radians(c.intercept_limit_deg))
+        self.capture = Capture(c.join_m, radius, math.radians(c.intercept_limit_deg))
 
     def init(self) -> GuidanceMemory:
         return GuidanceMemory()
@@ -168,7 +165,7 @@ class LandingGuidance:
         extra: Mapping[str, float] = {
             "acceleration": V_slope * m.x_dot,  # [m/s²] of the airspeed
             "pull": curvature * m.x_dot * m.x_dot,  # [m/s²] of the path, > 0 upwards
-            "sideslip": -aligned * crab,  # [rad]
+            "sideslip": aligned * crab,  # [rad]
         }
         return Reference(memory.mode, V, b.H + error, slope * m.x_dot, y, psi, phi, 0.0, r, extra)
 

@@ -217,18 +217,22 @@ class PathSettings:
 
 @dataclass(frozen=True, slots=True)
 class CaptureSettings:
-    """Tangential capture of the centreline by a turn at constant bank; bank stays within the limit."""
+    """Tangential capture of the centreline by a turn at constant bank; bank stays within the limit.
+
+    Within join_m the course is proportional to the offset; below end_m the lateral feedback takes over.
+    """
 
     bank_deg: float
     bank_limit_deg: float
     intercept_limit_deg: float
-    end_m: float  # |y| below which the linear law takes over
+    join_m: float
+    end_m: float
     heading_error_limit_deg: float
 
     __pydantic_config__ = _STRICT
 
     def __post_init__(self) -> None:
-        _positive(bank_deg=self.bank_deg, end_m=self.end_m, intercept_limit_deg=self.intercept_limit_deg)
+        _positive(bank_deg=self.bank_deg, join_m=self.join_m, end_m=self.end_m, intercept=self.intercept_limit_deg)
 
 
 @dataclass(frozen=True, slots=True)
