@@ -8,6 +8,7 @@ ground contacts are lifted out of the way: it knows only level terrain, so `plan
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +68,10 @@ class FlightModel:
         self._bind(fdm.get_propulsion().get_num_engines())
         self._lift_contacts()
         self.cg_offset_B = np.zeros(3) if cg_offset_B is None else np.array(cg_offset_B, dtype=float)
+        fdm.run_ic()
+        self.nominal_cg = np.array([self.get(f"inertia/cg-{a}-in") for a in "xyz"]) * INCH  # structural frame
+        for axis, value in zip("xyz", self.nominal_cg):
+            self.set(f"external_reactions/wheels/location-{axis}-in", float(value) / INCH)
         self._load_mass(mass)
 
     # ------------------------------------------------------------------------------------------ properties
@@ -118,6 +123,7 @@ class FlightModel:
         self.set_wheels_lbs = [n.set_double_value for n in force + moment]
         self.set("external_reactions/wheels/magnitude", 1.0)
         self.set("external_reactions/wheels-moment/magnitude-lbsft", 1.0)
+        self.set("atmosphere/turb-type", 0.0)
         self.node("propulsion/fuel_freeze").set_double_value(1.0)  # write-only
         self.n_engines = n_engines
 
@@ -131,7 +137,6 @@ class FlightModel:
             return
         path = "inertia/pointmass-{}[0]"
         payload = self.get(path.format("weight-lbs")) * KG_PER_LB
-        self._settle_mass()
         nominal = self.mass
         total = nominal if mass is None else mass
         payload += total - nominal
@@ -142,8 +147,6 @@ class FlightModel:
         for axis, delta in zip("XYZ", shift):
             place = path.format(f"location-{axis}-inches")
             self.set(place, self.get(place) + float(delta))
-
-    def _settle_mass(self) -> None:
         self._fdm.run_ic()
 
     @property
@@ -165,10 +168,12 @@ class FlightModel:
         latitude, longitude, height = geodetic
         fdm = self._fdm
         fdm.set_trim_status(True)
-        fdm["ic/h-sl-ft"] = height / FT
-        fdm["ic/lat-geod-rad"] = latitude
         fdm["ic/long-gc-rad"] = longitude
-        fdm["ic/h-sl-ft"] = height / FT
+        altitude = height / FT
+        for _ in range(3):  # "altitude above sea level" is along the radius: a millimetre off at 300 m
+            fdm["ic/h-sl-ft"] = altitude
+            fdm["ic/lat-geod-rad"] = latitude
+            altitude += height / FT - fdm["ic/geod-alt-ft"]
         for name, value in zip(("phi", "theta", "psi-true"), euler_N):
             fdm[f"ic/{name}-rad"] = float(value)
         for name, value in zip("uvw", uvw):
@@ -180,7 +185,7 @@ class FlightModel:
         fdm["propulsion/set-running"] = -1
         self.check()
         reached = (*(g() for g in self.geodetic), self.altitude_ft() * FT)
-        if max(abs(reached[0] - latitude), abs(reached[1] - longitude)) > 1e-9 or abs(reached[2] - height) > 1e-4:
+        if max(abs(reached[0] - latitude), abs(reached[1] - longitude)) > 1e-9 or abs(reached[2] - height) > 1e-6:
             raise PlantError(f"JSBSim did not take the initial position {geodetic}: it is at {reached}")
         if max(abs(g() * FT - v) for g, v in zip(self.uvw_fps, uvw)) > 1e-6:
             raise PlantError("JSBSim did not take the initial velocity")
@@ -193,7 +198,7 @@ class FlightModel:
         ):
             write(value)
 
-    def release(self, wind_N: Array) -> None:
+    def release(self, wind_N: Sequence[float]) -> None:
         """End the placing: from now on actuators and engines have memory, and the air moves with wind_N (3,) [m/s]."""
         fdm = self._fdm
         for write, value in zip(self.set_wind_fps, wind_N):
@@ -209,7 +214,7 @@ class FlightModel:
         fdm.set_sim_time(0.0)
         self.check_wind(wind_N)
 
-    def check_wind(self, wind_N: Array) -> None:
+    def check_wind(self, wind_N: Sequence[float]) -> None:
         """Raises PlantError if JSBSim flies in another wind than wind_N (3,) [m/s], or adds turbulence of its own."""
         if self.turbulence() != 0.0:
             raise PlantError(f"atmosphere/turb-type is {self.turbulence():g}: the wind is ours, JSBSim must add none")
