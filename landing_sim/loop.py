@@ -7,11 +7,12 @@ and controller decide, and their command acts after the computing delay; in betw
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from landing_sim.interfaces import Controller, Estimator, FrontEnd, Guidance, Plant, Sensor, World
-from landing_sim.signals import Command, Measurement, Sample, Step
+from landing_sim.signals import Command, Estimate, Measurement, Sample, Step
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +34,24 @@ def whole_steps(period: float, dt: float) -> int:
     if abs(n * dt - period) > 1e-9:
         raise ValueError(f"a period of {period} s is not a whole number of {dt} s steps")
     return n
+
+
+def take_in(
+    estimator: Estimator, memory: Any, front_ends: Mapping[str, FrontEnd], samples: Iterable[Sample]
+) -> tuple[Any, tuple[Measurement, ...]]:
+    """Turn samples into measurements, each where the estimate of its time says, and update with them.
+
+    Samples of a sensor that no front end is for are left alone: references that only the log wants.
+    """
+    measured: list[Measurement] = []
+    for sample in samples:
+        front_end = front_ends.get(sample.sensor)
+        if front_end is None:
+            continue
+        for measurement in front_end.process(sample, estimator.read(memory, sample.t_valid)):
+            memory = estimator.update(memory, measurement)
+            measured.append(measurement)
+    return memory, tuple(measured)
 
 
 def simulate(
@@ -76,11 +95,7 @@ def simulate(
 
         # the onboard side
         memory = estimator.predict(memory, acting, t)
-        measured: list[Measurement] = []
-        for sample in arrived:
-            for measurement in front_ends[sample.sensor].process(sample, estimator.read(memory, sample.t_valid)):
-                memory = estimator.update(memory, measurement)
-                measured.append(measurement)
+        memory, measured = take_in(estimator, memory, front_ends, arrived)
         estimate = estimator.read(memory)
         guidance_memory, reference = guidance.step(guidance_memory, estimate)
         controller_memory, command = controller.step(controller_memory, estimate, reference)
@@ -91,7 +106,7 @@ def simulate(
             truth,
             camera,
             arrived,
-            tuple(measured),
+            measured,
             estimate,
             reference,
             command,
@@ -109,3 +124,28 @@ def simulate(
             plant.step(acting, wind)
             tick += 1
         truth = plant.truth()
+
+
+def estimate_offline(
+    clock: Clock,
+    steps: Iterable[Step],
+    front_ends: Mapping[str, FrontEnd],
+    estimator: Estimator,
+    trim: Command,
+) -> Iterator[Estimate]:
+    """Run an estimator over a flight that somebody else flew: the filter open loop. One Estimate a Step.
+
+    It gets the samples in their order of arrival and the commands when they acted, nothing else of the Steps.
+    """
+    memory = estimator.init(0.0)
+    acting = trim
+    pending: deque[tuple[float, Command]] = deque()
+    for step in steps:
+        t = step.truth.t
+        while pending and pending[0][0] <= t + 1e-9:
+            memory = estimator.predict(memory, acting, pending[0][0])
+            acting = pending.popleft()[1]
+        memory = estimator.predict(memory, acting, t)
+        memory, _ = take_in(estimator, memory, front_ends, step.samples)
+        yield estimator.read(memory)
+        pending.append((t + clock.delay * clock.dt, step.command))
