@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterable
 from dataclasses import is_dataclass
@@ -83,7 +84,8 @@ def _assign(document: Document, keys: list[str], value: Any, mark: Mark) -> Prob
 def validate(document: Document, model: type[S]) -> S:
     """The document as a `model`. Raises ConfigError with every problem and its place."""
     try:
-        return model.model_validate(document.data)
+        # As JSON, where strictness allows mappings for dataclasses.
+        return model.model_validate_json(json.dumps(document.data))
     except ValidationError as error:
         raise ConfigError(_problems(document, model, error)) from None
 
@@ -111,6 +113,9 @@ def _message(item: Any, model: type[Section]) -> str:
             return f"unknown key{did_you_mean(str(key), _fields(model, tuple(parents)))}"
         case "missing":
             return "missing: this key is required"
+        case "literal_error" if len(context["expected"]) > 120:
+            near = did_you_mean(str(item["input"]), re.findall(r"'([^']*)'", context["expected"]))
+            return f"unknown word {found}{near}"
         case "literal_error":
             near = did_you_mean(str(item["input"]), re.findall(r"'([^']*)'", context["expected"]))
             return f"must be {context['expected']}, not {found}{near}"

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-_STRICT = {"extra": "forbid"}  # for readers that build dataclasses by type hints (pydantic): unknown keys are errors
+_STRICT = {"extra": "forbid", "strict": True, "allow_inf_nan": False}  # for vehicle.py, which builds these with pydantic
 
 
 def _increasing(name: str, values: Sequence[float]) -> None:
@@ -106,11 +106,27 @@ class LimitSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class GroundEffectSettings:
+    """How trim changes near the ground, over the height of the main wheels: what to add to elevator and alpha."""
+
+    height_m: tuple[float, ...]
+    elevator_deg: tuple[float, ...]
+    alpha_deg: tuple[float, ...]
+
+    __pydantic_config__ = _STRICT
+
+    def __post_init__(self) -> None:
+        _increasing("ground_effect.height_m", self.height_m)
+        if not len(self.height_m) == len(self.elevator_deg) == len(self.alpha_deg):
+            raise ValueError("ground_effect: height_m, elevator_deg and alpha_deg must be equally long")
+
+
+@dataclass(frozen=True, slots=True)
 class RolloutSettings:
     """On the wheels: attitude and elevator over groundspeed, steering, brakes.
 
-    elevator = schedule + attitude_gain (theta - schedule) + pitch_rate_gain q; the attitude asked for slews from the
-    one at touchdown at attitude_rate_dps. Heading asked for: -y_gain y, limited. Steering u = heading_gain error -
+    elevator = schedule + attitude_gain (theta - schedule) + pitch_rate_gain q; both schedules are approached from the
+    values at touchdown, at attitude_rate_dps and elevator_rate_dps. Heading asked for: -y_gain y, limited. Steering u = heading_gain error -
     yaw_rate_gain r [rad]; rudder -u, and brakes ± brake_steering u. Surface gains are for steering_mps and grow with
     its square over airspeed's as far as the limits go.
     """
@@ -120,6 +136,7 @@ class RolloutSettings:
     elevator_deg: tuple[float, ...]
     brake: tuple[float, ...]
     attitude_rate_dps: float
+    elevator_rate_dps: float
     attitude_gain: float
     pitch_rate_gain_s: float
     roll_gain: float
@@ -168,6 +185,7 @@ class ControlSettings:
     rudder: LimitSettings
     integral_limits: dict[str, float]  # int_V [m], int_H [m s]
     rollout: RolloutSettings
+    ground_effect: GroundEffectSettings | None = None
     camera: CameraSettings = CameraSettings()
 
     __pydantic_config__ = _STRICT

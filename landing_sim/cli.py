@@ -1,0 +1,197 @@
+"""The command line. Heavy packages load only in the commands that need them."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import traceback
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from landing_sim.errors import ConfigError, Mark, Problem
+
+if TYPE_CHECKING:
+    from landing_sim.scenario import Scenario
+
+# Before numpy loads: small matrices gain nothing from BLAS threads, and sums must not depend on how many there are.
+for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_threads, "1")
+
+PASSED, FAILED, USAGE, INTERNAL = 0, 1, 2, 3  # 130: interrupted
+
+app = typer.Typer(
+    name="landing-sim",
+    help="Vision-based landing, pixels in the loop: JSBSim flies, a camera is rendered, the 4D-approach filter estimates.",
+    epilog="Exit codes: 0 passed, 1 flown but criteria not met, 2 usage or bad file, 3 internal error, 130 interrupted.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+ScenarioArg = Annotated[str, typer.Argument(metavar="SCENARIO", help="A YAML file, or a shipped one: do128/gust.")]
+SetOption = Annotated[
+    list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Change a value, e.g. wind.gust.lateral_mps=-3.")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else there.")]
+
+
+@app.command()
+def run(
+    scenario: ScenarioArg,
+    set_: SetOption = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Root of all random numbers, instead of the file's.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the results; out/NAME-SEED if left out.")] = None,
+    json_: JsonOption = False,
+    live: Annotated[bool, typer.Option("--live", help="Watch it in the viewer while it flies.")] = False,
+    no_record: Annotated[bool, typer.Option("--no-record", help="Leave out the recording for the viewer.")] = False,
+) -> None:
+    """Fly a scenario: touchdown and accuracy table, columnar log, recording."""
+    changes = [*(set_ or []), *([] if seed is None else [f"seed={seed}"])]
+    _fly(_load(scenario, changes), scenario, out, as_json=json_, live=live, record=not no_record)
+
+
+@app.command()
+def replay(
+    path: Annotated[Path, typer.Argument(help="A folder that `run` wrote, or a recording (.rrd).")],
+    set_: SetOption = None,
+    web: Annotated[bool, typer.Option("--web", help="Show it in a browser instead of a window.")] = False,
+) -> None:
+    """Open a flight in the viewer; with --set, fly it again with these changes first."""
+    from landing_sim.runner import RECORDING, SCENARIO
+
+    if set_:
+        if not (path / SCENARIO).is_file():
+            raise ConfigError([Problem(Mark(str(path)), (), f"holds no {SCENARIO} to fly again")])
+        again = _load(str(path / SCENARIO), set_)
+        path = path.with_name(path.name + "-again")
+        _fly(again, again.name, path, as_json=False, live=False, record=True, leave=False)
+    recording = path / RECORDING if path.is_dir() else path
+    if not recording.is_file():
+        raise ConfigError([Problem(Mark(str(path)), (), f"no recording there: `landing-sim run` writes {RECORDING}")])
+    from landing_sim.record.replay import open_viewer
+
+    open_viewer(recording, web=web)
+
+
+@app.command()
+def reproduce(
+    paper: Annotated[str, typer.Argument(metavar="PAPER", help="e.g. dickmanns-1992; `list` shows all.")],
+    out: Annotated[Path | None, typer.Option(help="Folder for the report; out/PAPER if left out.")] = None,
+    json_: JsonOption = False,
+) -> None:
+    """Measure every claim of a paper: one row each, and the figures redrawn, in one HTML report."""
+    raise NotImplementedError
+
+
+@app.command()
+def design(
+    aircraft: Annotated[str, typer.Argument(metavar="AIRCRAFT", help="A vehicle under aircraft/, e.g. do128.")],
+    json_: JsonOption = False,
+) -> None:
+    """Trim, modes wanted and achieved, gains, stability margins."""
+    raise NotImplementedError
+
+
+@app.command()
+def check(
+    files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Scenarios (files or names) or vehicle.yaml.")],
+) -> None:
+    """Check files without flying: every problem as file:line:column."""
+    from landing_sim import paths, scenario, vehicle
+
+    problems: list[Problem] = []
+    for name in files:
+        try:
+            if Path(name).name == "vehicle.yaml":
+                vehicle.load_file(Path(name))
+            else:
+                model = scenario.load(name).aircraft.model
+                vehicle.load_file(paths.aircraft_folder(model) / "vehicle.yaml")
+        except ConfigError as error:
+            problems += error.problems
+        else:
+            typer.echo(f"{name}: good")
+    if problems:
+        raise ConfigError(problems)
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of scenario files, for editors."""
+    from landing_sim.scenario import schema_text
+
+    typer.echo(schema_text(), nl=False)
+
+
+@app.command()
+def doctor() -> None:
+    """Look for what could keep landing-sim from working here."""
+    from landing_sim import doctor as examination
+
+    raise typer.Exit(PASSED if examination.report(typer.echo) else FAILED)
+
+
+@app.command(name="list")
+def list_() -> None:
+    """Shipped scenarios, aircraft and papers."""
+    from landing_sim import paths, scenario
+
+    typer.echo("scenarios")
+    for name in paths.scenario_names():
+        typer.echo(f"  {name:22}{scenario.load(name).description}")
+    typer.echo("aircraft")
+    for name in paths.aircraft_names():
+        typer.echo(f"  {name}")
+    typer.echo("papers")
+
+
+def _load(name: str, changes: list[str]) -> Scenario:
+    from landing_sim.scenario import load
+
+    return load(name, changes)
+
+
+def _fly(
+    scenario: Scenario, label: str, out: Path | None, *, as_json: bool, live: bool, record: bool, leave: bool = True
+) -> None:
+    """Fly, write, show. Ends the command with the exit code that the result deserves, unless told not to `leave`."""
+    from landing_sim import progress, runner, vehicle
+
+    folder = out or Path("out") / f"{scenario.name}-{scenario.seed}"
+    runner.check_out(folder)
+    craft = vehicle.load(scenario.aircraft.model)
+    with runner.out_folder(folder) as work:
+        recording = work / runner.RECORDING if record else None
+        with progress.shown(scenario) as watch:
+            flight = runner.fly(scenario, craft, watch=watch, recording=recording, live=live)
+        result = runner.write(flight, scenario, label, work, folder)
+    if as_json:
+        typer.echo(json.dumps(result, allow_nan=False))
+    else:
+        progress.table(result)
+    if leave:
+        raise typer.Exit(PASSED if result["passed"] else FAILED)
+
+
+def main() -> None:
+    """Entry point: every way to end has its exit code and a message that helps."""
+    try:
+        app(prog_name="landing-sim")
+    except ConfigError as error:
+        print(error, file=sys.stderr)
+        sys.exit(USAGE)
+    except KeyboardInterrupt:
+        print("interrupted; nothing was written", file=sys.stderr)
+        sys.exit(130)
+    except Exception as error:
+        traceback.print_exc()
+        print(f"\nlanding-sim: internal error: {error}\n`landing-sim doctor` may tell why.", file=sys.stderr)
+        sys.exit(INTERNAL)
+
+
+if __name__ == "__main__":
+    main()

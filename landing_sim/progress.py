@@ -1,0 +1,114 @@
+"""What a person sees of a flight: progress while it lasts (on stderr), a table when it is over (on stdout)."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from landing_sim.scenario import Scenario
+from landing_sim.signals import Step
+
+LABELS = {
+    "range_m": "range error, within 500 m",
+    "range_far_percent": "range error, beyond 500 m",
+    "height_approach_m": "height error, approach",
+    "height_runway_m": "height error, over the runway",
+    "lateral_m": "lateral error",
+    "roll_deg": "roll error",
+    "pitch_deg": "pitch error",
+    "yaw_deg": "yaw error",
+    "airspeed_mps": "airspeed error",
+    "captured_after_m": "within 5 m of the centreline after",
+    "peak_roll_deg": "peak bank",
+    "touchdown_x_m": "touchdown x",
+    "touchdown_y_m": "touchdown y",
+    "sink_rate_mps": "sink rate at touchdown",
+    "touchdown_airspeed_mps": "airspeed at touchdown",
+    "final_groundspeed_mps": "ground speed at the end",
+    "rollout_y_m": "off the centreline on the ground",
+}
+UNITS = {"m": "m", "deg": "deg", "mps": "m/s", "percent": "%"}
+
+
+@contextmanager
+def shown(scenario: Scenario) -> Iterator[Callable[[Step], None]]:
+    """A watcher of steps: a bar on a terminal, else one JSON line a flight phase."""
+    if not sys.stderr.isatty():
+        yield _lines()
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[state]}"), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        start = scenario.initial.x_m
+        task = bar.add_task(scenario.name, total=scenario.runway.length_m - start, state="compiling, loading")
+
+        def watch(step: Step) -> None:
+            x, height, airspeed = step.truth.p_RB[0], -step.truth.p_RB[2], step.truth.airspeed
+            state = f"{step.reference.mode:9} x {x:6.0f} m  H {height:5.1f} m  {airspeed:4.1f} m/s"
+            bar.update(task, completed=x - start, state=state)
+
+        yield watch
+
+
+def _lines() -> Callable[[Step], None]:
+    mode = ""
+
+    def watch(step: Step) -> None:
+        nonlocal mode
+        if step.reference.mode != mode:
+            mode = step.reference.mode
+            p = step.truth.p_RB
+            line = {"t_s": round(step.truth.t, 3), "phase": mode, "x_m": round(p[0], 1), "height_m": round(-p[2], 2)}
+            print(json.dumps(line), file=sys.stderr, flush=True)
+
+    return watch
+
+
+def table(result: dict[str, Any]) -> None:
+    """The result of a run: touchdown, every criterion beside its limit and source, files."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    rows = Table(title=f"{result['scenario']}, seed {result['seed']}", title_justify="left")
+    for heading, justify in (("", "left"), ("ours", "right"), ("limit", "right"), ("", "left"), ("source", "left")):
+        rows.add_column(heading, justify=justify)  # type: ignore[arg-type]
+    for criterion in result["criteria"]:
+        value, limit = criterion["value"], criterion["limit"]
+        unit = UNITS.get(criterion["name"].rsplit("_", 1)[-1], "")
+        bounds = f"{limit[0]:g} ... {limit[1]:g}" if isinstance(limit, list) else f"{limit:g}"
+        rows.add_row(
+            LABELS.get(criterion["name"], criterion["name"]),
+            "none" if value is None else f"{value:.2f} {unit}",
+            f"{bounds} {unit}",
+            "[green]met[/]" if criterion["passed"] else "[bold red]not met[/]",
+            criterion["source"],
+        )
+    console.print(rows)
+    touchdown = result["touchdown"]
+    if touchdown:
+        console.print(
+            f"Touchdown after {touchdown['time_s']:.1f} s at x {touchdown['x_m']:.0f} m, y {touchdown['y_m']:+.2f} m: "
+            f"sink {touchdown['sink_rate_mps']:.2f} m/s, {touchdown['airspeed_mps']:.1f} m/s, "
+            f"pitch {touchdown['pitch_deg']:.1f} deg, bank {touchdown['bank_deg']:+.1f} deg, "
+            f"heading {touchdown['heading_error_deg']:+.1f} deg",
+            highlight=False,
+        )
+    verdict = "[bold green]passed[/]" if result["passed"] else "[bold red]criteria not met[/]"
+    timing = result["timing"]
+    console.print(
+        f"{result['outcome'].replace('_', ' ').capitalize()}: {verdict}. "
+        f"{timing['sim_s']:.1f} s flown in {timing['wall_s']:.1f} s",
+        highlight=False,
+    )
+    for kind, file in result["files"].items():
+        console.print(f"  {kind:10} {file}", highlight=False, soft_wrap=True)
+    if "recording" in result["files"]:
+        console.print(
+            "  watch it:  landing-sim replay " + result["files"]["recording"].rsplit("/", 1)[0], soft_wrap=True
+        )

@@ -1,0 +1,60 @@
+"""A vehicle: aircraft/NAME/vehicle.yaml, beside the flight model JSBSim reads, into frozen, checked values."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
+
+from landing_sim import config, paths, yamlfile
+from landing_sim.config import Section
+from landing_sim.control.settings import ControlSettings, GuidanceSettings
+from landing_sim.errors import ConfigError, VehicleError
+
+
+class Size(Section):
+    """Outer dimensions, for drawing."""
+
+    span_m: float = Field(gt=0, description="wing span")
+    length_m: float = Field(gt=0, description="nose to tail")
+
+
+class CameraMount(Section):
+    """Where the camera platform sits and how far it turns."""
+
+    forward_m: float = Field(description="from the nominal cg, body axes")
+    right_m: float = Field(0.0, description="from the nominal cg, body axes")
+    down_m: float = Field(description="from the nominal cg, body axes; above it is negative")
+    pan_limit_deg: float = Field(60.0, gt=0, le=180, description="either way")
+    tilt_limit_deg: float = Field(45.0, gt=0, le=80, description="either way")
+
+
+class Vehicle(Section):
+    """One aircraft as the crew and its designers know it; its flight model is NAME.xml in the same folder."""
+
+    schema_version: Literal[1] = Field(description="version of this format")
+    name: str = Field(min_length=1, max_length=100, description="what it is called")
+    description: str = Field("", max_length=2000, description="what it is")
+    mass_kg: float = Field(gt=0, description="nominal mass, for which the gains are made")
+    size: Size = Field(description="outer dimensions")
+    camera: CameraMount = Field(description="camera platform")
+    control: ControlSettings = Field(description="what the controller is designed from")
+    guidance: GuidanceSettings = Field(description="what the guidance flies")
+
+
+def load(name: str) -> Vehicle:
+    """A vehicle by its folder's name. Raises VehicleError holding every problem with its place."""
+    try:
+        folder = paths.aircraft_folder(name)
+    except ConfigError as error:
+        raise VehicleError(error.problems) from None
+    return load_file(folder / "vehicle.yaml")
+
+
+def load_file(path: Path) -> Vehicle:
+    """A vehicle from its file. Raises VehicleError holding every problem with its place."""
+    try:
+        return config.validate(yamlfile.load(path), Vehicle)
+    except ConfigError as error:
+        raise VehicleError(error.problems) from None
