@@ -40,7 +40,7 @@ class Truth:
     surfaces: Array  # (4,) [rad, rad, rad, 0..1] elevator, aileron, rudder, flap: positions reached, not commanded
     thrust: float  # [N] total
     wheels_height: Array  # (3,) [m] left main, right main, tail or nose: wheel bottom above the runway's surface, normal to it
-    on_ground: Array  # (3,) bool, the same wheels
+    on_ground: np.ndarray  # (3,) bool, the same wheels
     load_factor: float  # normal, 1 in level flight
 
 

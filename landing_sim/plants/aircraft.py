@@ -10,12 +10,11 @@ from typing import Protocol
 import numpy as np
 
 from landing_sim.geometry import so3
-from landing_sim.geometry.earth import A as EARTH_A
 from landing_sim.geometry.earth import RunwayFrame
 from landing_sim.jit import kernel
 from landing_sim.plants.jsbsim import FT, LBF, FlightModel, PlantError
 from landing_sim.plants.trim import TrimPoint, trim
-from landing_sim.plants.wheels import LEFT, Contacts, heights, reactions, read_contacts
+from landing_sim.plants.wheels import Contacts, heights, reactions, read_contacts
 from landing_sim.signals import CameraTruth, Command, Touchdown, Truth
 from landing_sim.types import Array
 
@@ -68,16 +67,23 @@ class _Body:
 
 
 @kernel
-def _locate(ecef: tuple[float, float, float], lat: float, lon: float, origin_E: Array, R_RE: Array,
-            p_R: Array, R_RN: Array) -> None:  # fmt: skip
-    """p_R (3,) [m] of the actual cg and R_RN (3, 3) there."""
+def _locate(
+    x: float, y: float, z: float, lat: float, lon: float, altitude: float, origin_E: Array, R_RE: Array, slope: float,
+    p_R: Array, R_RN: Array,
+) -> float:  # fmt: skip
+    """p_R (3,) [m] of the actual cg and R_RN (3, 3) there; returns the elevation [m] of the runway's surface below."""
     sp, cp, sl, cl = math.sin(lat), math.cos(lat), math.sin(lon), math.cos(lon)
-    R_EN = ((-sp * cl, -sl, -cp * cl), (-sp * sl, cl, -cp * sl), (cp, 0.0, -sp))
+    dx, dy, dz = x - origin_E[0], y - origin_E[1], z - origin_E[2]
     for i in range(3):
-        p_R[i] = 0.0
-        for j in range(3):
-            p_R[i] += R_RE[i, j] * (ecef[j] - origin_E[j])
-            R_RN[i, j] = R_RE[i, 0] * R_EN[0][j] + R_RE[i, 1] * R_EN[1][j] + R_RE[i, 2] * R_EN[2][j]
+        a, b, c = R_RE[i, 0], R_RE[i, 1], R_RE[i, 2]
+        p_R[i] = a * dx + b * dy + c * dz
+        R_RN[i, 0] = -a * sp * cl - b * sp * sl + c * cp
+        R_RN[i, 1] = -a * sl + b * cl
+        R_RN[i, 2] = -a * cp * cl - b * cp * sl - c * sp
+    up_x, up_z = -R_RN[0, 2], -R_RN[2, 2]
+    s, c = math.sin(slope), math.cos(slope)
+    above = (-s * p_R[0] - c * p_R[2]) / (-s * up_x - c * up_z)
+    return altitude - above
 
 
 class JsbsimPlant:
@@ -124,8 +130,9 @@ class JsbsimPlant:
         self._contacts = read_contacts(self._folder / f"{self._folder.name}.xml", model.nominal_cg)
         n = len(self._contacts.names)
         self._height, self._bristle, self._reaction = np.full(n, math.inf), np.zeros((n, 2)), np.zeros(6)
-        self._offset_B = model.cg_offset_B
-        self._body, self._tick, self._touchdown = _Body(), 0, None
+        self._pushing, self._tan_slope, self._offset_B = False, math.tan(self._slope), model.cg_offset_B
+        self._body, self._tick = _Body(), 0
+        self._touchdown: Touchdown | None = None
         if self._platform is not None:
             self._platform.reset(*self._start_angles)
         self._trim, p_R, theta, speed = self._stand() if s.on_ground else self._fly()
@@ -136,7 +143,6 @@ class JsbsimPlant:
         R_NR = self._frame.R_RN(*geodetic[:2]).T
         v_R = R_RB @ speed + (0.0 if s.on_ground else 1.0) * self._wind_R0
         model.controls(self._trim.elevator, 0.0, 0.0, self._trim.throttle, s.flap)
-        self._lay_runway(p_R, geodetic[2])
         model.place(geodetic, so3.to_euler(R_NR @ R_RB), R_RB.T @ v_R)
         self._refresh()
         self._wheels(Command())
@@ -208,20 +214,24 @@ class JsbsimPlant:
             self._written = wanted
 
     def _refresh(self) -> None:
-        """Position, terrain and rates after a step; attitude and velocity too where they are needed at once."""
+        """Position, rates and the terrain below, which JSBSim needs for the ground effect; near it, attitude too."""
         model, body = self._model, self._body
-        x, y, z = (read() * FT for read in model.ecef)
-        lat, lon = model.geodetic[0](), model.geodetic[1]()
-        _locate((x, y, z), lat, lon, self._frame.origin_E, self._frame.R_RE, body.p_R, body.R_RN)
+        x, y, z = model.ecef
+        lat, lon = model.geodetic
+        elevation = _locate(
+            x() * FT, y() * FT, z() * FT, lat(), lon(), model.altitude_ft() * FT, self._frame.origin_E,
+            self._frame.R_RE, self._slope, body.p_R, body.R_RN,
+        )  # fmt: skip
+        model.set_terrain_ft(elevation / FT)
         self._R_RN_rows = body.R_RN.tolist()
         self._x, _, down = body.p_R.tolist()
         self._H = -down
-        if not abs(self._x) + abs(self._H) < FAR_AWAY:
+        if not abs(self._x) + abs(down) < FAR_AWAY:
             raise PlantError(f"the aircraft has left the runway's neighbourhood: x {self._x:g} m, H {self._H:g} m")
-        body.pqr[:] = [read() for read in model.pqr]
-        self._lay_runway(body.p_R, model.altitude_ft() * FT)
+        p, q, r = model.pqr
+        body.pqr[0], body.pqr[1], body.pqr[2] = p(), q(), r()
         self._full = False
-        if self._H - self._x * math.tan(self._slope) < NEAR_GROUND:
+        if self._H - self._x * self._tan_slope < NEAR_GROUND:
             self._attitude()
 
     def _attitude(self) -> None:
@@ -237,37 +247,26 @@ class JsbsimPlant:
         body.v_R = body.R_RB @ body.uvw
         self._full = True
 
-    def _lay_runway(self, p_R: Array, altitude: float) -> None:
-        """Bring JSBSim's level terrain up to the surface below, for the ground effect."""
-        s, x = self._slope, float(p_R[0])
-        above = (-float(p_R[2]) * math.cos(s) - x * math.sin(s)) / (math.cos(s) - math.sin(s) * x / EARTH_A)
-        self._model.set_terrain_ft((altitude - above) / FT)
-
     def _wheels(self, command: Command) -> None:
         """What the ground does to the wheels in this state, for the next step; the first touch of a main wheel."""
-        if not self._full:
-            if self._reaction.any():
-                self._push(np.zeros(6))
-            return
         body, contacts = self._body, self._contacts
-        least = heights(body.p_R, body.R_RB, self._slope, contacts.p_B, self._height)
-        if least >= 0.0:
-            self._bristle[:] = 0.0
-            if self._reaction.any():
-                self._push(np.zeros(6))
+        if not self._full or heights(body.p_R, body.R_RB, self._slope, contacts.p_B, self._height) >= 0.0:
+            if self._pushing:
+                self._bristle[:] = self._reaction[:] = 0.0
+                self._push()
+                self._pushing = False
             return
         if self._touchdown is None and not self._initial.on_ground and min(self._height[0], self._height[1]) < 0.0:
             self._touchdown = self._touch()
-        out = np.empty(6)
         reactions(
             body.R_RB, body.v_R, body.pqr, self._slope, command.brake_left, command.brake_right, self.dt,
-            contacts.p_B, contacts.values, self._height, self._bristle, out,
+            contacts.p_B, contacts.values, self._height, self._bristle, self._reaction,
         )  # fmt: skip
-        self._push(out)
+        self._push()
+        self._pushing = True
 
-    def _push(self, force_moment: Array) -> None:
-        self._reaction = force_moment
-        for i, (write, value) in enumerate(zip(self._model.set_wheels_lbs, force_moment.tolist())):
+    def _push(self) -> None:
+        for i, (write, value) in enumerate(zip(self._model.set_wheels_lbs, self._reaction.tolist())):
             write(value / LBF if i < 3 else value / (LBF * FT))
 
     def _touch(self) -> Touchdown:

@@ -141,7 +141,9 @@ class FlightModel:
         total = nominal if mass is None else mass
         payload += total - nominal
         if not payload > 0.0:
-            raise PlantError(f"mass {total:g} kg leaves no payload: the flight model weighs {total - payload:g} kg empty")
+            raise PlantError(
+                f"mass {total:g} kg leaves no payload: the flight model weighs {total - payload:g} kg empty"
+            )
         self.set(path.format("weight-lbs"), payload / KG_PER_LB)
         shift = self.cg_offset_B * total / payload / INCH * np.array([-1.0, 1.0, -1.0])  # structural x aft, z up
         for axis, delta in zip("XYZ", shift):
@@ -156,9 +158,7 @@ class FlightModel:
 
     # ------------------------------------------------------------------------------------------ state
 
-    def place(
-        self, geodetic: tuple[float, float, float], euler_N: Array, uvw: Array, pqr: Array | None = None
-    ) -> None:
+    def place(self, geodetic: tuple[float, float, float], euler_N: Array, uvw: Array, pqr: Array | None = None) -> None:
         """Put the actual cg at (latitude, longitude [rad], height [m]) with attitude from local north-east-down [rad]
         and velocity over the ground uvw (3,) [m/s] and rates pqr (3,) [rad/s] in body axes; still air.
 

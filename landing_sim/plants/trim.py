@@ -20,6 +20,8 @@ STATES = ("u", "v", "w", "p", "q", "r", "phi", "theta", "psi", "x", "y", "H")
 INPUTS = ("elevator", "thrust", "aileron", "rudder")
 PLACE = (math.radians(45.0), 0.0)  # latitude, longitude where gravity is taken, unless told otherwise; heading north
 
+NO_GROUND = -1e5  # [ft] elevation of terrain too far below to matter
+
 
 @dataclass(frozen=True, slots=True)
 class TrimPoint:
@@ -61,26 +63,28 @@ def trim(
     `model` saves loading one. Raises PlantError, with what is missing, where there is no such flight.
     """
     m = FlightModel(folder, 0.005, mass, cg_offset_B) if model is None else model
-    z = np.array([0.05, 0.0, 0.3])
-    step = np.array([1e-4, 1e-4, 1e-4])
+
+    def residual(z: Array) -> Array:
+        """du, dw [m/s^2], dq [rad/s^2] for alpha, elevator, throttle."""
+        alpha = float(z[0])
+        m.controls(float(z[1]), 0.0, 0.0, float(z[2]), flap)
+        m.set_terrain_ft(NO_GROUND)
+        uvw = airspeed * np.array([math.cos(alpha), 0.0, math.sin(alpha)])
+        m.place((*place, height), np.array([0.0, alpha + gamma, 0.0]), uvw)
+        return m.accelerations()[0][[0, 2, 4]]
+
+    z, h = np.array([0.05, 0.0, 0.3]), 1e-4
     for _ in range(40):
-        f = _residual(m, airspeed, gamma, flap, (*place, height), z)
+        f = residual(z)
         if np.max(np.abs(f)) < 1e-9:
             break
-        J = np.empty((3, 3))
-        for i in range(3):
-            d = np.zeros(3)
-            d[i] = step[i]
-            J[:, i] = (
-                _residual(m, airspeed, gamma, flap, (*place, height), z + d) - _residual(m, airspeed, gamma, flap, (*place, height), z - d)
-            ) / (2.0 * step[i])
+        J = np.column_stack([(residual(z + d) - residual(z - d)) / (2.0 * h) for d in h * np.eye(3)])
         try:
-            dz = np.linalg.solve(J, -f)
+            z = z + np.clip(np.linalg.solve(J, -f), -0.1, 0.1)
         except np.linalg.LinAlgError:
             break
-        z = z + np.clip(dz, -0.1, 0.1)
         z[2] = min(max(z[2], 0.0), 1.0)
-    f = _residual(m, airspeed, gamma, flap, (*place, height), z)
+    f = residual(z)
     thrust = m.accelerations()[1]
     if not np.max(np.abs(f)) < 1e-6 or abs(z[1]) > m.ranges[0]:
         raise PlantError(
@@ -88,25 +92,12 @@ def trim(
             f"{math.degrees(z[0]):.1f} deg, elevator {z[1]:.3f} of {m.ranges[0]:g} rad, throttle {z[2]:.2f} with "
             f"accelerations {f[0]:.2g}, {f[1]:.2g} m/s^2, {f[2]:.2g} rad/s^2"
         )
-    _residual(m, airspeed, gamma, flap, (*place, height), np.array([z[0], z[1], 1.0]))
+    residual(np.array([z[0], z[1], 1.0]))
     full = m.accelerations()[1]
     return TrimPoint(
         airspeed=airspeed, gamma=gamma, flap=flap, mass=m.mass, height=height, alpha=float(z[0]),
         theta=float(z[0]) + gamma, elevator=float(z[1]), throttle=float(z[2]), thrust=thrust, max_thrust=full,
     )  # fmt: skip
-
-
-def _residual(
-    m: FlightModel, airspeed: float, gamma: float, flap: float, at: tuple[float, float, float], z: Array
-) -> Array:
-    alpha = float(z[0])
-    m.controls(float(z[1]), 0.0, 0.0, float(z[2]), flap)
-    euler = np.array([0.0, alpha + gamma, 0.0])
-    uvw = np.array([airspeed * math.cos(alpha), 0.0, airspeed * math.sin(alpha)])
-    m.set_terrain_ft(-1e5)
-    m.place(at, euler, uvw)
-    a = m.accelerations()[0]
-    return a[[0, 2, 4]]
 
 
 def linearise(folder: Path, point: TrimPoint, model: FlightModel | None = None) -> LinearModel:
@@ -124,7 +115,7 @@ def linearise(folder: Path, point: TrimPoint, model: FlightModel | None = None) 
 
     def force(x: Array, u: Array) -> tuple[Array, float]:
         m.controls(u[0], u[2], u[3], u[1], point.flap)
-        m.set_terrain_ft(-1e5)
+        m.set_terrain_ft(NO_GROUND)
         m.place((*PLACE, x[8]), np.array([x[6], x[7], 0.0]), x[:3], x[3:6])
         return m.accelerations()
 

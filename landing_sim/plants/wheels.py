@@ -5,8 +5,8 @@ meaning: a linear spring and damper along the surface's normal, rolling friction
 The tangential force is a bristle: a spring that is dragged along. At rest it holds; rolling, its side deflection relaxes
 over a distance sigma, which gives a cornering stiffness k_t sigma; it slips at the friction limit.
 
-Source     relaxation length: Pacejka, "Tire and Vehicle Dynamics", chapter 5 (stretched string). Bristles at rest: Canudas de
-           Wit et al. 1995 (LuGre).
+Source     relaxation length: Pacejka, "Tire and Vehicle Dynamics", chapter 5 (stretched string). Bristles at rest:
+           Canudas de Wit et al. 1995 (LuGre).
 """
 
 from __future__ import annotations
@@ -44,7 +44,9 @@ def read_contacts(path: Path, origin: Array) -> Contacts:
     def number(contact: ElementTree.Element, name: str, unit: str | None = None) -> float:
         element = contact.find(name)
         if element is None or element.text is None or element.get("unit") != unit:
-            raise PlantError(f"{path.name}: contact {contact.get('name')} needs {name}" + (f" in {unit}" if unit else ""))
+            raise PlantError(
+                f"{path.name}: contact {contact.get('name')} needs {name}" + (f" in {unit}" if unit else "")
+            )
         return float(element.text)
 
     rows: list[tuple[float, str, Array, Array]] = []
