@@ -11,6 +11,7 @@ from landing_sim import config, paths, yamlfile
 from landing_sim.config import Section
 from landing_sim.control.settings import ControlSettings, GuidanceSettings
 from landing_sim.errors import ConfigError, VehicleError
+from landing_sim.estimators.belief import AircraftBelief
 
 
 class Size(Section):
@@ -23,9 +24,7 @@ class Size(Section):
 class CameraMount(Section):
     """Where the camera platform sits and how far it turns."""
 
-    forward_m: float = Field(description="from the nominal cg, body axes")
-    right_m: float = Field(0.0, description="from the nominal cg, body axes")
-    down_m: float = Field(description="from the nominal cg, body axes; above it is negative")
+    p_BC_m: tuple[float, float, float] = Field(description="camera from the nominal cg: forward, right, down")
     pan_limit_deg: float = Field(60.0, gt=0, le=180, description="either way")
     tilt_limit_deg: float = Field(45.0, gt=0, le=80, description="either way")
 
@@ -40,6 +39,7 @@ class Vehicle(Section):
     size: Size = Field(description="outer dimensions")
     camera: CameraMount = Field(description="camera platform")
     control: ControlSettings = Field(description="what the controller is designed from")
+    believed: AircraftBelief = Field(AircraftBelief(), description="the aircraft as the filter takes it to be")
     guidance: GuidanceSettings = Field(description="what the guidance flies")
 
 

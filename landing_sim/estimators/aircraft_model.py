@@ -14,88 +14,14 @@ Source     Dickmanns & Schell 1992, section 2, eqs. (1), (5). Departs: wind is a
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass, fields, replace
+from dataclasses import fields
 
 import numpy as np
 
+from landing_sim.estimators.belief import AircraftBelief
 from landing_sim.geometry.so3 import from_euler
 from landing_sim.jit import kernel
-from landing_sim.noise import NoiseStream
 from landing_sim.types import Array
-
-
-@dataclass(frozen=True, slots=True)
-class AircraftBelief:
-    """Parameters of the filter's aircraft. SI, radians, coefficients referred to S (and b or c); rates as pb/2V, qc/2V.
-
-    alpha is measured from the body x axis; elevator > 0 nose down, aileron > 0 right wing down, rudder > 0 nose left.
-    """
-
-    mass: float = 4000.0
-    Ixx: float = 15100.0
-    Iyy: float = 16900.0
-    Izz: float = 29100.0
-    Ixz: float = 1200.0
-    S: float = 29.0
-    b: float = 15.55
-    c: float = 1.90
-    rho: float = 1.225
-    g: float = 9.81
-    CL_alpha: float = 4.80  # wing-body
-    alpha_0: float = 0.0908  # incidence minus zero-lift angle
-    CL_flap: float = 0.90
-    eps_alpha: float = 0.34  # downwash gradient
-    eps_flap: float = 0.1875  # flap's share, as an angle of attack
-    CLt_alpha: float = 0.963  # tail lift slope, referred to S
-    i_tail: float = 0.070
-    l_tail: float = 6.8
-    x_ac: float = 0.228  # wing-body aerodynamic centre ahead of the cg
-    CD_0: float = 0.040
-    CD_flap: float = 0.090
-    k_induced: float = 0.0509
-    Cm_0: float = -0.03
-    Cm_flap: float = -0.10
-    Cm_q: float = -3.0  # wing-body alone
-    z_thrust: float = 0.45  # thrust line below the cg
-    CY_beta: float = -0.60
-    CY_rudder: float = 0.15
-    CY_p: float = -0.15
-    CY_r: float = 0.40
-    Cl_beta: float = -0.085
-    Cl_aileron: float = 0.15
-    Cl_rudder: float = 0.015
-    Cl_p: float = -0.50
-    Cl_r0: float = 0.04
-    Cl_rL: float = 0.20
-    Cn_beta: float = 0.10
-    Cn_rudder: float = -0.10
-    Cn_ailL: float = -0.01
-    Cn_p0: float = -0.01
-    Cn_pL: float = -0.07
-    Cn_r: float = -0.18
-    tau_downwash: float = 0.145
-    tau_surface: float = 0.08
-    tau_engine: float = 0.7
-    T_0: float = 16000.0  # both engines, static
-    T_V: float = -0.0113  # T = T_0 throttle (1 + T_V V + T_VV V^2)
-    T_VV: float = 4.4e-5
-    T_idle: float = 0.0  # share of full thrust at throttle 0
-    h_wing: float = 0.0  # height of the wing above the cg, for ground effect
-
-    def vector(self) -> Array:
-        """All parameters as one array, in the order of the fields, for the kernels."""
-        return np.array(astuple(self))
-
-    def perturbed(self, noise: NoiseStream, aero_sigma: float, mass_sigma: float) -> AircraftBelief:
-        """A belief that is off: derivatives and inertias by `aero_sigma`, mass and lift offset by `mass_sigma` (1 sigma,
-        relative), each drawn independently. Geometry, air density, thrust map and lags stay."""
-        aero = [n for n in _NAMES if n.startswith(("C", "eps_", "k_", "I")) and n != "CL_flap"]
-        draws = noise.normal(len(aero) + 2)
-        changes = {n: getattr(self, n) * (1.0 + aero_sigma * d) for n, d in zip(aero, draws)}
-        changes["mass"] = self.mass * (1.0 + mass_sigma * draws[-2])
-        changes["CL_flap"] = self.CL_flap * (1.0 + mass_sigma * draws[-1])
-        return replace(self, **changes)
-
 
 _NAMES = tuple(f.name for f in fields(AircraftBelief))
 (
