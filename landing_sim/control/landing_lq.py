@@ -18,12 +18,13 @@ import numpy as np
 from landing_sim.control.believed import Believed, Motion, believed, motion
 from landing_sim.control.design import Design, PointDesign
 from landing_sim.control.pointing import look_along
-from landing_sim.control.rollout import Rollout
+from landing_sim.control.rollout import Rollout, RolloutMemory
 from landing_sim.control.settings import ThrustSettings
 from landing_sim.control.tables import Schedule, interpolate
 from landing_sim.signals import Command, Estimate, Reference
 
 GRAVITY = 9.80665
+ON_TOUCHDOWN = RolloutMemory()
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,14 +38,14 @@ class ControlMemory:
     elevator: float = math.nan  # [rad]
     aileron: float = 0.0
     rudder: float = 0.0
-    attitude: float = 0.0  # [rad] asked for on the wheels
-    brake: float = 0.0
+    rollout: RolloutMemory = ON_TOUCHDOWN
 
 
 class LandingController:
     """interfaces.Controller. Constants only; all memory is in ControlMemory."""
 
-    __slots__ = ("_camera", "_flap", "_integral", "_limits", "_schedule", "_slowest", "_thrust", "_trim", "rollout")
+    __slots__ = ("_camera", "_flap", "_ground_effect", "_integral", "_limits", "_rollout", "_schedule", "_slowest",
+                 "_thrust", "_trim")  # fmt: skip
 
     def __init__(self, design: Design) -> None:
         s = design.settings
@@ -60,7 +61,8 @@ class LandingController:
         c = s.camera
         self._camera = tuple(math.radians(a) for a in (c.elevation_deg, c.search_pan_deg, c.search_tilt_deg, c.max_deg))
         self._flap = s.flap
-        self.rollout = Rollout(s.rollout)
+        self._ground_effect = s.ground_effect
+        self._rollout = Rollout(s.rollout)
 
     def init(self) -> ControlMemory:
         return ControlMemory()
@@ -79,19 +81,20 @@ class LandingController:
         pan, tilt = look_along(b.phi, b.theta, b.psi, 0.0, elevation)
         dt = min(max(estimate.t - memory.t, 0.0), 0.5)
         if reference.mode == "rollout" or reference.mode == "stopped":
-            elevator, aileron, rudder, left, right, attitude, brake = self.rollout.step(
-                b, m, reference, memory.attitude if memory.mode == reference.mode else b.theta, memory.brake, dt
-            )
-            throttle, int_V, int_H = 0.0, 0.0, 0.0
+            ground = memory.rollout
+            if memory.mode not in ("rollout", "stopped"):
+                ground = RolloutMemory(b.theta, memory.elevator if math.isfinite(memory.elevator) else 0.0)
+            ground, (elevator, aileron, rudder, left, right) = self._rollout.step(ground, b, m, reference, dt)
+            throttle = int_V = int_H = 0.0
         else:
             elevator, throttle, aileron, rudder, int_V, int_H = self._fly(memory, b, m, reference, dt)
-            left = right = attitude = brake = 0.0
+            ground, left, right = ON_TOUCHDOWN, 0.0, 0.0
         last = memory.elevator if memory.elevator == memory.elevator else elevator
         elevator = _limited(elevator, last, dt, *self._limits[0])
         aileron = _limited(aileron, memory.aileron, dt, *self._limits[1])
         rudder = _limited(rudder, memory.rudder, dt, *self._limits[2])
         return ControlMemory(
-            estimate.t, reference.mode, int_V, int_H, elevator, aileron, rudder, attitude, brake
+            estimate.t, reference.mode, int_V, int_H, elevator, aileron, rudder, ground
         ), Command(elevator, aileron, rudder, throttle, self._flap, left, right, _clip(pan, most), _clip(tilt, most))
 
     def _fly(
@@ -105,6 +108,11 @@ class LandingController:
          alpha, elevator0, thrust0, path0, mass, w_pull, el_pull, ph_slip, a_slip, r_slip, a_turn, r_turn,
          ) = self._schedule(V)  # fmt: skip
         per_q = 1.0 / (V * V)
+        if self._ground_effect is not None and "wheel_height" in ref.extra:
+            g, height = self._ground_effect, ref.extra["wheel_height"]
+            if height < g.height_m[-1]:
+                elevator0 += math.radians(interpolate(height, g.height_m, g.elevator_deg))
+                alpha += math.radians(interpolate(height, g.height_m, g.alpha_deg))
         # What the reference asks for: a flight path through the air, its curvature, a speed and its change.
         path = (ref.climb_rate + b.wz) / V
         q_ref = extra("pull", 0.0) / V

@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from landing_sim.control.believed import Believed, Motion
 from landing_sim.control.settings import RolloutSettings
 from landing_sim.control.tables import interpolate
 from landing_sim.signals import Reference
+
+
+@dataclass(frozen=True, slots=True)
+class RolloutMemory:
+    """What the schedules have reached: attitude [rad], elevator [rad] without feedback, mean brake."""
+
+    attitude: float = 0.0
+    elevator: float = 0.0
+    brake: float = 0.0
 
 
 class Rollout:
@@ -19,19 +29,15 @@ class Rollout:
         self.settings = settings
 
     def step(
-        self, b: Believed, m: Motion, ref: Reference, attitude: float, brake: float, dt: float
-    ) -> tuple[float, float, float, float, float, float, float]:
-        """elevator, aileron, rudder [rad], left and right brake, and the attitude [rad] and mean brake to remember."""
+        self, memory: RolloutMemory, b: Believed, m: Motion, ref: Reference, dt: float
+    ) -> tuple[RolloutMemory, tuple[float, float, float, float, float]]:
+        """The next memory, and elevator, aileron, rudder [rad], left and right brake."""
         s = self.settings
         speed = math.hypot(m.x_dot, m.y_dot)
-        wanted = math.radians(interpolate(speed, s.groundspeed_mps, s.attitude_deg))
-        slew = math.radians(s.attitude_rate_dps) * dt
-        attitude = min(max(wanted, attitude - slew), attitude + slew)
-        elevator = (
-            math.radians(interpolate(speed, s.groundspeed_mps, s.elevator_deg))
-            + s.attitude_gain * (b.theta - attitude)
-            + s.pitch_rate_gain_s * b.q
-        )
+        at = s.groundspeed_mps
+        attitude = _towards(interpolate(speed, at, s.attitude_deg), memory.attitude, s.attitude_rate_dps * dt)
+        feed = _towards(interpolate(speed, at, s.elevator_deg), memory.elevator, s.elevator_rate_dps * dt)
+        elevator = feed + s.attitude_gain * (b.theta - attitude) + s.pitch_rate_gain_s * b.q
         aileron = -s.roll_gain * b.phi - s.roll_rate_gain_s * b.p
         limit = math.radians(s.heading_limit_deg)
         heading = ref.psi + min(max(math.radians(s.y_gain_deg_per_m) * (ref.y - b.y), -limit), limit)
@@ -39,8 +45,14 @@ class Rollout:
         steer = s.heading_gain * error - s.yaw_rate_gain_s * b.r
         # The rudder's moment goes with airspeed squared; at low speed the brakes take over.
         rudder = -steer * min((s.steering_mps / max(m.airspeed, 1.0)) ** 2, 4.0)
-        level = 1.0 if ref.mode == "stopped" else interpolate(speed, s.groundspeed_mps, s.brake)
-        brake = min(level, brake + s.brake_rate_per_s * dt)
+        level = 1.0 if ref.mode == "stopped" else interpolate(speed, at, s.brake)
+        brake = min(level, memory.brake + s.brake_rate_per_s * dt)
         turn = s.brake_steering_per_deg * math.degrees(steer) if ref.mode == "rollout" else 0.0
         left, right = min(max(brake - turn, 0.0), 1.0), min(max(brake + turn, 0.0), 1.0)
-        return elevator, aileron, rudder, left, right, attitude, brake
+        return RolloutMemory(attitude, feed, brake), (elevator, aileron, rudder, left, right)
+
+
+def _towards(wanted_deg: float, now: float, step_deg: float) -> float:
+    """`now` [rad] moved towards wanted_deg by at most step_deg."""
+    step = math.radians(step_deg)
+    return min(max(math.radians(wanted_deg), now - step), now + step)

@@ -67,7 +67,8 @@ class AxisSettings:
     __pydantic_config__ = _STRICT
 
     def __post_init__(self) -> None:
-        _positive(**self.typical, **self.authority, **self.tolerance)
+        for sizes in (self.typical, self.authority, self.tolerance):
+            _positive(**sizes)
         if self.rho < 0.0:
             raise ValueError("rho must be 0 or more")
 
@@ -126,9 +127,9 @@ class RolloutSettings:
     """On the wheels: attitude and elevator over groundspeed, steering, brakes.
 
     elevator = schedule + attitude_gain (theta - schedule) + pitch_rate_gain q; both schedules are approached from the
-    values at touchdown, at attitude_rate_dps and elevator_rate_dps. Heading asked for: -y_gain y, limited. Steering u = heading_gain error -
-    yaw_rate_gain r [rad]; rudder -u, and brakes ± brake_steering u. Surface gains are for steering_mps and grow with
-    its square over airspeed's as far as the limits go.
+    values at touchdown, at attitude_rate_dps and elevator_rate_dps. Heading asked for: -y_gain y, limited. Steering
+    u = heading_gain error - yaw_rate_gain r [rad]; rudder -u, growing below steering_mps with its square over airspeed's
+    up to fourfold, and brakes ± brake_steering u.
     """
 
     groundspeed_mps: tuple[float, ...]
