@@ -97,7 +97,7 @@ class Gust(Section):
 
     at_x_m: float = Field(-650.0, description="where it strikes")
     lateral_mps: float = Field(-2.0, ge=-30, le=30, description="towards +y (right)")
-    vertical_mps: float = Field(1.0, ge=-30, le=30, description="towards +z: downward")
+    vertical_mps: float = Field(1.0, ge=-30, le=30, description="updraught positive")
     time_constant_s: Positive = Field(6.0, description="it decays as exp(-t/this)")
 
 

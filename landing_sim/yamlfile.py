@@ -188,7 +188,9 @@ class _Builder:
                 self._problem(event, here, f"duplicate key, first given on line {first}")
             self.document.keys.setdefault(here, self._mark(event))
             value_event = next(events)
-            self.document.values.setdefault(here, self._mark(value_event))
+            # A value left empty has no place of its own.
+            empty = isinstance(value_event, ScalarEvent) and not value_event.value and value_event.style is None
+            self.document.values.setdefault(here, self._mark(event if empty else value_event))
             out[key] = self._node(value_event, events, here)
         return out
 
