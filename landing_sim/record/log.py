@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from landing_sim.signals import CameraSample, Feature, Status, Step, Touchdown
+from landing_sim.signals import CameraSample, EdgeSet, Feature, Residuals, Status, Step, Touchdown
 from landing_sim.types import Array
 
 SCHEMA = 1
@@ -127,7 +127,7 @@ class LogBuilder:
     _extras: list[Mapping[str, float]] = field(default_factory=list)
     _flags: list[Mapping[str, bool]] = field(default_factory=list)
     _rotations: list[np.ndarray] = field(default_factory=list)
-    _edges: list[tuple[int, Any, Array, Array | None]] = field(default_factory=list)
+    _edges: list[tuple[int, EdgeSet, Array, Residuals | None]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self._rows = np.full((self.capacity, len(_FIXED)), np.nan)
@@ -177,7 +177,7 @@ class LogBuilder:
         self._rotations.append(truth.R_RB)
         for measurement in step.measurements:
             if measurement.geometry is not None:
-                self._edges.append((k, measurement.geometry, measurement.z, step.innovation))
+                self._edges.append((k, measurement.geometry, measurement.z, estimate.residuals))
         self._n = k + 1
 
     def finish(
@@ -258,12 +258,12 @@ class LogBuilder:
         uv = np.full((n, m, 2), np.nan)
         z = np.full((n, m), np.nan)
         innovation = np.full((n, m), np.nan)
-        for k, edges, z_k, innovation_k in self._edges:
+        for k, edges, z_k, seen in self._edges:
             count = len(z_k)
             feature[k, :count], status[k, :count] = edges.feature, edges.status
             uv[k, :count], z[k, :count] = edges.centre, z_k
-            if innovation_k is not None:
-                innovation[k, : len(innovation_k)] = innovation_k
+            if seen is not None and len(seen.status) == count:
+                status[k, :count], innovation[k, :count] = seen.status, seen.innovation
         return {
             "window_feature": feature,
             "window_status": status,

@@ -113,7 +113,8 @@ def _into_image(a: Array, b: Array, k: Intrinsics) -> Array | None:
     if a[2] < NEAR or b[2] < NEAR:
         cut = a + (NEAR - a[2]) / (b[2] - a[2]) * (b - a)
         a, b = (cut, b) if a[2] < NEAR else (a, cut)
-    return _clip(*((k.cx + k.f * p[0] / p[2], k.cy + k.f * p[1] / p[2]) for p in (a, b)), k)
+    start, stop = ((k.cx + k.f * p[0] / p[2], k.cy + k.f * p[1] / p[2]) for p in (a, b))
+    return _clip(start, stop, k)
 
 
 def _across_image(l: Array, k: Intrinsics) -> Array | None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +18,7 @@ import numpy as np
 
 from landing_sim.geometry.so3 import camera_from_body, from_euler
 from landing_sim.record import overlay, shapes
+from landing_sim.record.channels import ERRORS, MODE_COLOURS, SERIES, SPANS, events
 from landing_sim.record.log import FlightLog
 from landing_sim.signals import Feature, Status, Step
 
@@ -28,62 +28,6 @@ if TYPE_CHECKING:
 TIMELINE = "time"
 TRUE_COLOUR, ESTIMATE_COLOUR, BAND_COLOUR = (60, 220, 120), (255, 170, 40), (150, 150, 165)
 IMAGE = "world/camera/image"
-DEGREES = 57.29577951308232
-
-ERRORS = (  # entity, state, title, factor to the unit shown
-    ("errors/x", "x", "range x [m]", 1.0),
-    ("errors/y", "y", "lateral y [m]", 1.0),
-    ("errors/H", "H", "height H [m]", 1.0),
-    ("errors/phi", "phi", "roll [deg]", DEGREES),
-    ("errors/theta", "theta", "pitch [deg]", DEGREES),
-    ("errors/psi", "psi", "yaw [deg]", DEGREES),
-    ("errors/u", "u", "forward speed u [m/s]", 1.0),
-    ("errors/wy", "wy", "crosswind [m/s]", 1.0),
-)
-SERIES = (  # entity, title, ((column, name, factor), ...)
-    ("flight/height", "height of the cg [m]", (("true_H_m", "true", 1.0), ("ref_height_m", "reference", 1.0))),
-    ("flight/lateral", "lateral offset [m]", (("true_y_m", "true", 1.0), ("ref_y_m", "reference", 1.0))),
-    (
-        "flight/airspeed",
-        "airspeed [m/s]",
-        (
-            ("true_airspeed_mps", "true", 1.0),
-            ("meas_airspeed_mps", "measured", 1.0),
-            ("ref_airspeed_mps", "reference", 1.0),
-        ),
-    ),
-    (
-        "flight/attitude",
-        "attitude [deg]",
-        (("true_phi_rad", "roll", DEGREES), ("true_theta_rad", "pitch", DEGREES), ("true_psi_rad", "yaw", DEGREES)),
-    ),
-    (
-        "flight/wind",
-        "true wind in R [m/s]",
-        (("true_wx_mps", "along", 1.0), ("true_wy_mps", "across", 1.0), ("true_wz_mps", "down", 1.0)),
-    ),
-    (
-        "flight/commands",
-        "commands [deg]",
-        (
-            ("cmd_elevator_rad", "elevator", DEGREES),
-            ("cmd_aileron_rad", "aileron", DEGREES),
-            ("cmd_rudder_rad", "rudder", DEGREES),
-        ),
-    ),
-    ("flight/throttle", "throttle, brakes", (("cmd_throttle", "throttle", 1.0), ("cmd_brake_left", "brake", 1.0))),
-    ("flight/nis", "innovation: NIS per measurement", (("nis_ratio", "NIS", 1.0),)),
-)
-MODE_COLOURS = {
-    "acquire": 0x8D99AEFF,
-    "capture": 0x4CC9F0FF,
-    "glide": 0x4895EFFF,
-    "flare": 0xF9A03FFF,
-    "decrab": 0xF3722CFF,
-    "rollout": 0x43AA8BFF,
-    "stopped": 0x577590FF,
-    "go_around": 0xE63946FF,
-}
 
 
 class ReplayError(RuntimeError):
@@ -101,6 +45,7 @@ class Scene:
     span: float = 15.6  # [m] of the aircraft
     fuselage: float = 11.4
     markings: bool = True
+    start: tuple[float, float, float] = (-950.0, -85.0, -51.0)  # [m] p_RB at t = 0: where the watching eye begins
     title: str = "landing-sim"
 
 
@@ -151,7 +96,13 @@ class Recorder:
         edges = next((m for m in step.measurements if m.geometry is not None), None)
         if edges is not None and edges.geometry is not None:
             geometry = edges.geometry
-            status = [overlay.STATUS_COLOURS[Status(s)] for s in geometry.status]
+            residuals = step.estimate.residuals
+            judged = (
+                geometry.status
+                if residuals is None or len(residuals.status) != len(geometry.status)
+                else residuals.status
+            )
+            status = [overlay.STATUS_COLOURS[Status(s)] for s in judged]
             found = overlay.measured_edges(geometry, edges.z)
             boxes = overlay.window_boxes(geometry)
             stream.log(f"{IMAGE}/windows", rr.LineStrips2D(boxes, colors=status, radii=0.5, draw_order=20.0))
@@ -182,35 +133,22 @@ class Recorder:
         rr, stream, scene = _rerun(), self._stream, self._scene
         k = scene.camera.intrinsics
         stream.log("world", rr.ViewCoordinates.FRD, static=True)
-        tan = float(np.tan(scene.slope))
-        grass = shapes.rectangle(-2500.0, scene.length + 1500.0, -1200.0, 1200.0, -0.4 - max(0.0, 2500.0 * tan))
-        for entity, mesh, colour in (
-            ("ground", shapes.polygons([grass]), (52, 74, 48)),
-            (
-                "runway",
-                shapes.polygons(
-                    [shapes.rectangle(0.0, scene.length, -0.5 * scene.width, 0.5 * scene.width, 0.0, scene.slope)]
-                ),
-                (96, 98, 104),
-            ),
-            (
-                "markings",
-                shapes.polygons(shapes.markings(scene.width, scene.length, scene.slope, 0.25)),
-                (240, 240, 240),
-            ),
-            ("aircraft/body", shapes.aircraft(scene.span, scene.fuselage), (235, 238, 245)),
-        ):
-            if entity == "markings" and not scene.markings:
-                continue
-            vertices, triangles = mesh
-            normals = None if entity == "aircraft/body" else np.tile(np.float32([0.0, 0.0, -1.0]), (len(vertices), 1))
-            stream.log(
-                f"world/{entity}",
-                rr.Mesh3D(
-                    vertex_positions=vertices, triangle_indices=triangles, vertex_normals=normals, albedo_factor=colour
-                ),
-                static=True,
-            )
+        for entity in ("world/aircraft", "world/camera", IMAGE):
+            stream.log(entity, rr.TransformAxes3D(0.0), static=True)
+        half, length, slope = 0.5 * scene.width, scene.length, scene.slope
+        flat = [
+            ("grass", shapes.grass(scene.width, length, slope), (86, 112, 70)),
+            ("runway", [shapes.rectangle(0.0, length, -half, half, 0.0, slope)], (96, 98, 104)),
+        ]
+        if scene.markings:
+            flat.append(("markings", shapes.markings(scene.width, length, slope, 0.6), (240, 240, 240)))
+        for name, polygons, colour in flat:
+            vertices, triangles = shapes.polygons(polygons)
+            up = np.tile(np.array([0.0, 0.0, -1.0], np.float32), (len(vertices), 1))
+            stream.log(f"world/{name}", _mesh(vertices, triangles, colour, up), static=True)
+        stream.log(
+            "world/aircraft/body", _mesh(*shapes.aircraft(scene.span, scene.fuselage), (235, 238, 245)), static=True
+        )
         pinhole = rr.Pinhole(
             image_from_camera=k.K,
             width=k.width,
@@ -220,7 +158,7 @@ class Recorder:
             color=(255, 255, 255, 90),
         )
         stream.log(IMAGE, pinhole, static=True)
-        for entity, _, title, _ in ERRORS:
+        for entity, *_ in ERRORS:
             names = ["error", "+3 sigma", "-3 sigma"]
             style = rr.SeriesLines(
                 colors=[ESTIMATE_COLOUR, BAND_COLOUR, BAND_COLOUR], names=names, widths=[2.0, 1.0, 1.0]
@@ -238,7 +176,7 @@ def record_log(stream: rr.RecordingStream, log: FlightLog) -> None:
     rr = _rerun()
     t = log["t_s"]
 
-    def times(which: np.ndarray | slice) -> list[Any]:
+    def times(which: Any) -> list[Any]:
         return [rr.TimeColumn(TIMELINE, duration=t[which])]
 
     everything = slice(None)
@@ -249,7 +187,13 @@ def record_log(stream: rr.RecordingStream, log: FlightLog) -> None:
     for entity, position, rotations in (("world/aircraft", p, R_RB), ("world/camera", p_camera, R_RC)):
         columns = rr.Transform3D.columns(translation=position, mat3x3=np.stack(rotations))
         stream.send_columns(entity, times(everything), columns)
-    stream.log("world/path/true", rr.LineStrips3D([p], colors=TRUE_COLOUR, radii=rr.Radius.ui_points(2.0)), static=True)
+    stream.log("world/path/true", rr.LineStrips3D([p], colors=TRUE_COLOUR, radii=rr.Radius.ui_points(1.5)), static=True)
+    ground = np.column_stack([p[:, :2], np.full(len(p), -0.6)])
+    stream.log(
+        "world/path/ground",
+        rr.LineStrips3D([ground], colors=(20, 30, 20, 120), radii=rr.Radius.ui_points(1.0)),
+        static=True,
+    )
     known = log["valid"]
     believed = np.column_stack([log.estimate("x"), log.estimate("y"), -log.estimate("H")])[known]
     if len(believed) > 1:
@@ -265,9 +209,9 @@ def record_log(stream: rr.RecordingStream, log: FlightLog) -> None:
     derived = {"nis_ratio": nis_ratio}
     for entity, _, series in SERIES:
         values = np.column_stack([factor * (derived[c] if c in derived else log[c]) for c, _, factor in series])
-        use = np.isfinite(values).any(axis=1)
-        if use.any():
-            stream.send_columns(entity, times(use), rr.Scalars.columns(scalars=values[use]))
+        some = np.isfinite(values).any(axis=1)
+        if some.any():
+            stream.send_columns(entity, times(some), rr.Scalars.columns(scalars=values[some]))
     modes = log["mode"]
     changes = np.flatnonzero(np.concatenate([[True], modes[1:] != modes[:-1]]))
     for k in changes:
@@ -276,28 +220,6 @@ def record_log(stream: rr.RecordingStream, log: FlightLog) -> None:
     for when, text in events(log):
         stream.set_time(TIMELINE, duration=when)
         stream.log("flight/events", rr.TextLog(text, level=rr.TextLogLevel.INFO))
-
-
-def events(log: FlightLog) -> Iterator[tuple[float, str]]:
-    """(time [s], what happened), in order."""
-    t, x, modes = log["t_s"], log["true_x_m"], log["mode"]
-    found: list[tuple[float, str]] = []
-    for k in np.flatnonzero(np.concatenate([[True], modes[1:] != modes[:-1]])):
-        found.append((float(t[k]), f"phase: {modes[k]} at x = {x[k]:.0f} m, H = {log['true_H_m'][k]:.1f} m"))
-    if log["valid"].any():
-        k = int(np.argmax(log["valid"]))
-        error = abs(log.error("x")[k])
-        found.append((float(t[k]), f"runway acquired at x = {x[k]:.0f} m; range off by {error:.1f} m"))
-    if "threshold_found" in log and log["threshold_found"].any():
-        k = len(t) - 1 - int(np.argmax(log["threshold_found"][::-1]))
-        found.append((float(t[k]), f"threshold last seen {-x[k]:.0f} m before it"))
-    touchdown = log.touchdown
-    if touchdown is not None:
-        where = f"x = {touchdown.x:.0f} m, y = {touchdown.y:.2f} m"
-        found.append(
-            (touchdown.t, f"touchdown at {where}, sink {touchdown.sink_rate:.2f} m/s, {touchdown.airspeed:.1f} m/s")
-        )
-    yield from sorted(found)
 
 
 def open_viewer(path: Path, web: bool = False) -> None:
@@ -330,18 +252,22 @@ def _blueprint(scene: Scene) -> Any:
             origin=entity, name=title, axis_y=axis, plot_legend=rrb.PlotLegend(visible=span is None)
         )
 
+    x, y, z = scene.start
     chase = rrb.Spatial3DView(
         origin="world",
         name="runway, true path (green) and estimated path (orange)",
-        background=(24, 28, 36),
+        background=(150, 178, 205),
         line_grid=False,
         eye_controls=rrb.EyeControls3D(
-            position=(-1130.0, -190.0, -130.0), look_target=(-300.0, 0.0, -10.0), eye_up=(0.0, 0.0, -1.0)
+            position=(x - 90.0, y - 35.0, z - 24.0),
+            look_target=(x, y, z),
+            eye_up=(0.0, 0.0, -1.0),
+            tracking_entity="world/aircraft/body",
         ),
     )
     image = rrb.Spatial2DView(origin=IMAGE, name="camera: windows (white), measured (yellow), predicted edges")
     errors = rrb.Grid(
-        *(plot(e, title, _SPANS.get(e)) for e, _, title, _ in ERRORS), grid_columns=4, name="errors and 3 sigma"
+        *(plot(e, title, SPANS.get(e)) for e, _, title, _ in ERRORS), grid_columns=4, name="errors and 3 sigma"
     )
     flight = rrb.Grid(*(plot(e, title) for e, title, _ in SERIES), grid_columns=4, name="flight and commands")
     phases = rrb.Vertical(
@@ -361,16 +287,12 @@ def _blueprint(scene: Scene) -> Any:
     )
 
 
-_SPANS = {
-    "errors/x": (-20.0, 20.0),
-    "errors/y": (-1.5, 1.5),
-    "errors/H": (-1.5, 1.5),
-    "errors/phi": (-0.6, 0.6),
-    "errors/theta": (-0.3, 0.3),
-    "errors/psi": (-0.6, 0.6),
-    "errors/u": (-2.0, 2.0),
-    "errors/wy": (-2.0, 2.0),
-}
+def _mesh(
+    vertices: np.ndarray, triangles: np.ndarray, colour: overlay.Colour, normals: np.ndarray | None = None
+) -> Any:
+    return _rerun().Mesh3D(
+        vertex_positions=vertices, triangle_indices=triangles, vertex_normals=normals, albedo_factor=colour
+    )
 
 
 def _jpeg(pixels: np.ndarray) -> bytes:

@@ -29,6 +29,13 @@ def rectangle(x0: float, x1: float, y0: float, y1: float, lift: float, slope: fl
     return np.array([[x, y, -lift - rise * x] for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))])
 
 
+def grass(width: float, length: float, slope: float) -> list[Array]:
+    """The ground around the runway, left out beneath it: so near to each other both would flicker."""
+    half, x0, x1, side = 0.5 * width, -3000.0, length + 2000.0, 1500.0
+    pieces = ((x0, 0.0, -side, side), (length, x1, -side, side), (0.0, length, -side, -half), (0.0, length, half, side))
+    return [rectangle(*piece, 0.0, slope) for piece in pieces]
+
+
 def markings(width: float, length: float, slope: float, lift: float) -> list[Array]:
     """Borderlines, centreline and threshold stripes, for the eye of whoever watches the replay."""
     half, side = 0.5 * width, 0.9
