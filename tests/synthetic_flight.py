@@ -1,4 +1,4 @@
-"""A flight made on paper: kinematics in place of an aircraft, drawn errors in place of a filter. Steps as the loop yields."""
+"""A flight made on paper: kinematics in place of an aircraft, drawn errors in place of a filter."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from landing_sim.signals import (
     Feature,
     Measurement,
     Reference,
+    Residuals,
     Sample,
     Status,
     Step,
@@ -133,10 +134,11 @@ def _step(truth: Truth, error: np.ndarray, valid: bool, k: int) -> Step:
     sample = CameraSample(FlatFrame(camera.p_RC, R_CR), k, pan, tilt, pan, tilt)
     uvw = truth.R_RB.T @ truth.v_RB_R
     true = np.concatenate([uvw, truth.w_RB_B, truth.euler, truth.p_RB[:2], [-truth.p_RB[2]], truth.wind_R, np.zeros(3)])
-    estimate = Estimate(
-        truth.t, STATES, true + error, np.diag(SIGMA**2), valid, {"threshold_in_view": truth.p_RB[0] < -120}
-    )
     measurement, innovation = _edges(truth, camera, k)
+    seen, status = np.isfinite(innovation), measurement.geometry.status
+    residuals = Residuals(innovation, status, float(np.sum(innovation[seen] ** 2)) / 0.045, int(seen.sum()))
+    flags = {"threshold_in_view": bool(truth.p_RB[0] < -120)}
+    estimate = Estimate(truth.t, STATES, true + error, np.diag(SIGMA**2), valid, flags, residuals)
     x = truth.p_RB[0]
     mode = (
         "acquire"
@@ -157,10 +159,11 @@ def _step(truth: Truth, error: np.ndarray, valid: bool, k: int) -> Step:
         Sample("gyro", truth.t, truth.t, truth.w_RB_B + 1e-3),
         Sample("airspeed", truth.t, truth.t, truth.airspeed),
     )
+    command = Command(elevator=0.02, throttle=0.4)
+    measurements = (measurement,)
     return Step(
-        truth, camera, samples, (measurement,), estimate, reference, Command(elevator=0.02, throttle=0.4), innovation,
-        float(innovation[np.isfinite(innovation)] @ innovation[np.isfinite(innovation)]), int(np.isfinite(innovation).sum()),
-    )  # fmt: skip
+        truth, camera, samples, measurements, estimate, reference, command, innovation, residuals.nis, residuals.dof
+    )
 
 
 def _edges(truth: Truth, camera: CameraTruth, k: int) -> tuple[Measurement, np.ndarray]:

@@ -45,8 +45,8 @@ class Scene:
     span: float = 15.6  # [m] of the aircraft
     fuselage: float = 11.4
     markings: bool = True
-    start: tuple[float, float, float] = (-950.0, -85.0, -51.0)  # [m] p_RB at t = 0: where the watching eye begins
     title: str = "landing-sim"
+    start: tuple[float, float, float] = (-950.0, -85.0, -51.0)  # [m] p_RB at t = 0: where the watching eye begins
 
 
 class Recorder:
