@@ -215,11 +215,20 @@ class Flat:
 class Camera:
     """A camera whose k-th frame has the grey level k."""
 
-    name, period = "camera", 0.06
+    name, period, channels = "camera", 0.06, 0
 
     def sense(self, truth: Truth, camera: CameraTruth) -> Sample | None:
         k = round(truth.t / self.period)
         return Sample("camera", truth.t, truth.t, CameraSample(Flat(k), k, 0.1 * k, 0.2 * k, 0.0, 0.0))
+
+
+class Mute:
+    """A sensor that does not say what it sends."""
+
+    name, period = "mute", 0.06
+
+    def sense(self, truth: Truth, camera: CameraTruth) -> Sample | None:
+        return None
 
 
 def run(fault: Fault, sensor: Sensor | None = None, n: int = 10) -> list[Sample | None]:
@@ -355,6 +364,7 @@ def test_faults_nest() -> None:
         (lambda: Delayed(math.nan), "delay"),
         (lambda: Intermittent(1.0), "'off'"),
         (lambda: Faulty(Camera(), Wrong(bias=1.0), Noise(1, "f")), "image has no bias"),
+        (lambda: Faulty(Mute(), Off(), Noise(1, "f")), "how many channels"),
         (lambda: Faulty(Camera(), Garbage(1.0), Noise(1, "f")), "leave it out"),
         (lambda: Faulty(Clock(), Garbage(), Noise(1, "f")), "needs a spread"),
         (lambda: Faulty(Clock(), Wrong(bias=(1.0, 2.0)), Noise(1, "f")), r"needs 1 number"),
@@ -378,3 +388,32 @@ def test_truth_is_left_as_it_was() -> None:
         sensor.sense(state, CAMERA)
     for name in ("p_RB", "w_RB_B", "R_RB"):
         np.testing.assert_array_equal(getattr(state, name), getattr(before, name))
+
+
+def test_the_real_camera_can_fail() -> None:
+    """A stuck frame shows the old pose for ever; a random one has the camera's size; the encoders go on."""
+    from landing_sim.geometry.pinhole import Intrinsics
+    from landing_sim.geometry.so3 import camera_from_body
+    from landing_sim.sensors.camera import Camera as RealCamera
+    from landing_sim.sensors.platform import PanTilt
+    from landing_sim.world.runway import Runway
+
+    def sensed(fault: Fault) -> list[Sample]:
+        camera = RealCamera(Intrinsics.centred(96, 64, 400.0), Runway(), PanTilt(), Noise(1, "px"), Noise(1, "enc"))
+        faulty = Faulty(camera, fault, Noise(1, "fault"))
+        out = []
+        for k in range(3):
+            pose = CameraTruth(np.array([-400.0 + 60.0 * k, 0.0, -20.0]), camera_from_body(0.0, -0.05), 0.01 * k, -0.05)
+            sample = faulty.sense(truth(0.06 * k), pose)
+            assert sample is not None
+            out.append(sample)
+        return out
+
+    healthy, stuck, garbage = sensed(Off(start=99.0)), sensed(Stuck(start=0.05)), sensed(Garbage(start=0.05))
+    first = healthy[0].data.frame.full()
+    assert not np.array_equal(healthy[2].data.frame.full(), first)
+    for k in (1, 2):
+        np.testing.assert_array_equal(stuck[k].data.frame.full(), first)
+        assert stuck[k].data.pan == healthy[k].data.pan != healthy[0].data.pan
+        assert garbage[k].data.frame.full().shape == first.shape == (64, 96)
+        assert garbage[k].data.frame.full().std() > 60.0  # uniform: 73.9

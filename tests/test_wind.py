@@ -40,6 +40,14 @@ def test_gust_goes_on_wherever_the_aircraft_goes_then() -> None:
     np.testing.assert_allclose(wind.wind(12.0, -900.0, 38.0, 50.0), [0.0, -2.0 * math.exp(-1.0), 0.0])
 
 
+def test_a_gust_once_met_does_not_start_again() -> None:
+    """A Wind flown a second time would otherwise blow harder than ever."""
+    wind = Wind(PAPER)
+    wind.wind(6.0, -649.0, 38.0, 50.0)
+    with pytest.raises(ValueError, match="time went back"):
+        wind.wind(0.0, -950.0, 51.0, 50.0)
+
+
 def test_gust_meets_at_once_who_starts_beyond_it() -> None:
     np.testing.assert_array_equal(Wind(PAPER).wind(0.0, -500.0, 30.0, 50.0), [0.0, -3.0, -1.0])
 

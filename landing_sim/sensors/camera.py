@@ -53,6 +53,8 @@ class Camera:
     latency : [s] from the middle of the exposure until the frame is in the computer's hands
     """
 
+    channels = 0  # no numbers that a fault could scale or shift
+
     __slots__ = ("_encoder_noise", "_encoders", "_index", "_latency", "_mount", "_past", "name", "period", "renderer")
 
     def __init__(

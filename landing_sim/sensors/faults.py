@@ -140,17 +140,20 @@ class Faulty:
 
     Parameters
     ----------
-    sensor : what fails. Its `channels` says how many numbers its samples hold; one without it is taken for a camera
+    sensor : what fails. Its `channels` says how many numbers its samples hold, 0 for a camera
     fault : how it fails
     noise : stream of the fault's own randomness (garbage, intermittent)
 
-    Raises ValueError for a fault that makes no sense for the sensor.
+    Raises ValueError for a fault that makes no sense for the sensor, or a sensor without `channels`.
     """
 
     def __init__(self, sensor: Sensor, fault: Fault, noise: NoiseStream) -> None:
         self.name = sensor.name
         self.period = sensor.period
-        self.channels = int(getattr(sensor, "channels", 0))
+        channels = getattr(sensor, "channels", None)
+        if channels is None:
+            raise ValueError(f"sensor {sensor.name} cannot fail: it does not say how many channels it has (0: images)")
+        self.channels = int(channels)
         self.sensor = sensor
         self.fault = fault
         self._noise = noise

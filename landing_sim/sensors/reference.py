@@ -2,7 +2,7 @@
 
 They serve the analogue of Dickmanns & Schell 1992, section 7.2, figs. 12-15, where the optical estimate is compared
 with a differential GPS (whose height "showed errors") and a radiometric altimeter. The paper gives no error figures:
-the defaults are estimates for equipment of about 1992 (code-differential C/A receiver at 1 Hz; pulse altimeter).
+the defaults are estimates for equipment of about 1992 (code-differential C/A receiver at about 1 Hz; pulse altimeter).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from landing_sim.types import Array
 class DifferentialGpsConfig:
     """A code-differential GPS; m and s. Pairs are (horizontal per axis, vertical)."""
 
-    period: float = 1.0
+    period: float = 1.02  # about 1 Hz, in whole control cycles of 60 ms
     noise: tuple[float, float] = (0.5, 1.0)  # 1 sigma, white
     drift: tuple[float, float] = (1.0, 2.0)  # 1 sigma of the slow (multipath, residual atmosphere) error
     drift_time: float = 60.0  # its correlation time

@@ -9,6 +9,7 @@ class SquatSwitch:
     """1.0 while both main wheels carry weight, else 0.0 (interfaces.Sensor)."""
 
     name = "squat"
+    channels = 1
 
     def __init__(self, period: float) -> None:
         self.period = period

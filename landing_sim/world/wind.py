@@ -107,6 +107,8 @@ class _MetGust:
             if x <= gust.at_x:
                 return 0.0, 0.0, 0.0
             self._t_met = t
+        elif t < self._t_met:
+            raise ValueError(f"gust: time went back to {t} s, before it was met; make a new Wind for a new run")
         decay = math.exp((self._t_met - t) / gust.tau)
         return 0.0, gust.lateral * decay, -gust.vertical * decay
 
