@@ -15,7 +15,7 @@ import numpy as np
 
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.sensors import render_cv2
-from landing_sim.sensors.render_kernels import develop_frame, edge_table, project, shade_frame, shade_windows
+from landing_sim.sensors.render_kernels import TILE, develop_frame, edge_table, project, shade
 from landing_sim.signals import CameraTruth
 from landing_sim.types import Array
 from landing_sim.world.runway import GRASS, SKY, Runway
@@ -23,6 +23,7 @@ from landing_sim.world.runway import GRASS, SKY, Runway
 RENDERERS = ("exact", "line_aa", "line_8")
 SUB_EXPOSURES = 4  # instants averaged into one frame when the shutter is not instantaneous
 QUANTILES = 65536
+NOTHING = np.empty((0, 0), np.uint8)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +71,19 @@ class Renderer:
     key : 64-bit key of the pixel noise, from `Noise.key()`
     """
 
-    __slots__ = ("camera", "intrinsics", "key", "lens", "material", "optics", "palette", "points", "quantiles", "table")
+    __slots__ = (
+        "camera",
+        "intrinsics",
+        "key",
+        "lens",
+        "material",
+        "optics",
+        "palette",
+        "points",
+        "quantiles",
+        "table",
+        "tiles",
+    )
 
     def __init__(self, intrinsics: Intrinsics, runway: Runway, optics: Optics, key: int) -> None:
         c = intrinsics
@@ -82,6 +95,8 @@ class Renderer:
         self.camera = np.array([c.f, c.cx, c.cy, c.width, c.height, optics.blur])
         self.lens = np.array([optics.gain, optics.offset, optics.noise])
         self.key = np.uint64(key)
+        columns, rows = np.meshgrid(np.arange(0, c.width, TILE), np.arange(0, c.height, TILE))
+        self.tiles = np.column_stack([columns.ravel(), rows.ravel()]).astype(np.int64)
         self.table, self.quantiles = _edge_table(), gaussian_quantiles()
 
     def frame(
@@ -123,35 +138,22 @@ class RenderedFrame:
 
     def windows(self, corners: np.ndarray, width: int, height: int) -> np.ndarray:
         """(n, height, width) uint8 for n corners (n, 2) int64 [u0, v0]; ValueError if one leaves the frame."""
-        if len(corners) and (
-            width < 1
-            or height < 1
-            or corners.min() < 0
-            or corners[:, 0].max() > self.width - width
-            or corners[:, 1].max() > self.height - height
-        ):
-            raise ValueError(
-                f"windows of {width}x{height} at {corners.tolist()} do not all lie in the {self.width}x{self.height} frame"
-            )
-        if self.renderer.optics.renderer != "exact":
-            image = self.full()
-            return np.array(
-                [image[v : v + height, u : u + width] for u, v in corners.tolist()], dtype=np.uint8
-            ).reshape(len(corners), height, width)
-        r = self.renderer
-        return shade_windows(  # type: ignore[no-any-return]
-            corners,
-            width,
-            height,
-            *self._project(),
-            r.camera,
-            r.palette,
-            r.lens,
-            r.table,
-            r.quantiles,
-            r.key,
-            self.index,
-        )
+        r, n = self.renderer, len(corners)
+        inside = True
+        if r.optics.renderer == "exact":
+            out = np.empty((n * height, width), np.uint8)
+            inside = self._shade(out, corners, width, height, NOTHING)
+            out = out.reshape(n, height, width)
+        else:
+            image = np.lib.stride_tricks.sliding_window_view(self.full(), (height, width))
+            last_v, last_u = image.shape[:2]
+            u, v = corners.T
+            inside = bool(np.all((u >= 0) & (v >= 0) & (u < last_u) & (v < last_v)))
+            out = image[v, u] if inside else image[:0, 0]
+        if not inside:
+            frame = f"{self.width}x{self.height}"
+            raise ValueError(f"windows of {width}x{height} at {corners.tolist()} do not all lie in the {frame} frame")
+        return out
 
     def full(self) -> np.ndarray:
         """(height, width) uint8, the same pixels as the windows. Kept once made; do not write to it."""
@@ -172,7 +174,7 @@ class RenderedFrame:
             image,
             lines[0],
             count,
-            colours[seen[0, :count]],
+            colours[seen[0, :count, 0]],
             int(colours[GRASS]),
             horizon[0],
             self.poses[0][1],
@@ -180,28 +182,25 @@ class RenderedFrame:
             antialias=r.optics.renderer == "line_aa",
         )
         if exact:
-            return shade_frame(  # type: ignore[no-any-return]
-                image,
-                lines,
-                seen,
-                counts,
-                horizon,
-                r.camera,
-                r.palette,
-                r.lens,
-                r.table,
-                r.quantiles,
-                r.key,
-                self.index,
-            )
+            out = np.empty_like(image)
+            self._shade(out, r.tiles, TILE, TILE, image)
+            return out
         blurred = render_cv2.blur(image, r.optics.blur)
         return develop_frame(blurred, r.lens, r.quantiles, r.key, self.index)  # type: ignore[no-any-return]
+
+    def _shade(self, out: np.ndarray, corners: np.ndarray, width: int, height: int, filled: np.ndarray) -> bool:
+        r = self.renderer
+        scene = self._project()
+        return shade(  # type: ignore[no-any-return]
+            out, corners, width, height, filled, *scene, r.camera, r.palette, r.lens, r.table, r.quantiles, r.key,
+            self.index,
+        )  # fmt: skip
 
     def _project(self) -> tuple[Array, np.ndarray, np.ndarray, Array]:
         if self._scene is None:
             r, n = self.renderer, len(self.poses)
             m = len(r.points)
-            lines, seen = np.empty((n, m, 4, 3)), np.empty((n, m), np.int64)
+            lines, seen = np.empty((n, m, 4, 3)), np.empty((n, m, 5), np.int64)
             counts, horizon = np.empty(n, np.int64), np.empty((n, 5))
             for k, (p_RC, R_CR) in enumerate(self.poses):
                 counts[k] = project(r.points, r.material, p_RC, R_CR, r.camera, lines[k], seen[k], horizon[k])

@@ -9,7 +9,8 @@ edges of a quadrilateral are a slab, Phi(d1) + Phi(d2) - 1, which keeps the cont
 two slabs are multiplied (exact where they are at right angles; elsewhere inexact only within ~2 sigma of a corner).
 Layers are composed bottom up. Lines are stored in table units (TABLE_HALF at the edge, 0 and 2 TABLE_HALF at -+ CUT
 sigma), beyond which the profile is exactly 0 or 1: so skipping what cannot matter changes no bit, and windows, tiles
-and single pixels agree whatever is computed with them.
+and single pixels agree whatever is computed with them. For the same reason nothing is drawn more than CUT sigma outside
+the box around a quadrilateral's corners (which also removes the spikes that four profiles leave at sharp corners).
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ CUT = 4.0  # [sigma] half width of an edge's profile
 TABLE_HALF = 512
 TABLE_SIZE = 2 * TABLE_HALF
 SLACK = 1e-6  # table units: covers rounding when a whole block is classified at once
-TILE = 16  # [px] side of the blocks a full frame is made of
+TILE = 32  # [px] side of the blocks a full frame is made of
+FAR = 1 << 20  # [px] outside every image
 CULL_MARGIN = 64.0  # [px] around the image outside which a quadrilateral is dropped
 
 SKY, GRASS = 0, 1  # as in world.runway
@@ -54,12 +56,14 @@ def project(
     """Project quadrilaterals `points` (m, 4, 3) [m], frame R, into image lines.
 
     camera (6,): f, cx, cy [px], width, height, blur sigma [px].
-    Fills lines (m, 4, 3) in table units, seen (m,) the material of each, horizon (5,): gradient and offset of the
+    Fills lines (m, 4, 3) in table units, seen (m, 5) the material of each and the first and last column and row that it
+    may touch, horizon (5,): gradient and offset of the
     z component (frame R) of the ray (x, y, 1) of pixel (u, v), sine of the dip, bound of the gradient.
     Returns the number of quadrilaterals kept: those in front of the camera, near the image and seen from above.
     """
     f, cx, cy = camera[0], camera[1], camera[2]
     units = TABLE_HALF / (CUT * camera[5])
+    pad = CUT * camera[5]
     left, right = -(cx + CULL_MARGIN) / f, (camera[3] - cx + CULL_MARGIN) / f
     top, bottom = -(cy + CULL_MARGIN) / f, (camera[4] - cy + CULL_MARGIN) / f
     q = np.empty((4, 3))
@@ -91,12 +95,23 @@ def project(
                     break
             a, b = n0 / f, n1 / f
             c = n2 - a * cx - b * cy
-            scale = units / max(math.hypot(a, b), 1e-12 * abs(c) + 1e-300)
+            scale = units / max(math.sqrt(a * a + b * b), 1e-12 * abs(c) + 1e-300)
             lines[count, i, 0] = a * scale
             lines[count, i, 1] = b * scale
             lines[count, i, 2] = c * scale + TABLE_HALF
         if above:
-            seen[count] = material[m]
+            seen[count, 0] = material[m]
+            seen[count, 1] = seen[count, 3] = -FAR
+            seen[count, 2] = seen[count, 4] = FAR
+            if min(q[0, 2], q[1, 2], q[2, 2], q[3, 2]) > 0.0:
+                for j in range(2):
+                    centre = cy if j else cx
+                    least, most = 1.0 * FAR, -1.0 * FAR
+                    for i in range(4):
+                        at = f * q[i, j] / q[i, 2] + centre
+                        least, most = min(least, at), max(most, at)
+                    seen[count, 2 * j + 1] = math.ceil(max(least - pad, -1.0 * FAR))
+                    seen[count, 2 * j + 2] = math.floor(min(most + pad, 1.0 * FAR))
             count += 1
     horizon[0] = R_CR[0, 2] / f
     horizon[1] = R_CR[1, 2] / f
@@ -107,28 +122,43 @@ def project(
 
 
 @kernel
-def _dip_function(u: float, v: float, horizon: Array, camera: Array) -> tuple[float, float]:
-    """F = r_z - sin(dip) |r| of the ray through (u, v), > 0 below the horizon, and |grad F| per pixel.
+def _dip_function(u: float, v: float, horizon: Array, camera: Array) -> tuple[float, float, float]:
+    """F = r_z - sin(dip) |r| of the ray through (u, v), > 0 below the horizon, and its gradient per pixel.
 
-    F is concave in the image (the ground is a convex region), which makes the bounds of `_classify` exact.
+    F is concave in the image (the ground is a convex region), which makes the bounds of `_side` exact.
     """
-    f, s = camera[0], horizon[3]
-    x, y = (u - camera[1]) / f, (v - camera[2]) / f
+    inv, s = 1.0 / camera[0], horizon[3]
+    x, y = (u - camera[1]) * inv, (v - camera[2]) * inv
     norm = math.sqrt(1.0 + x * x + y * y)
     value = horizon[0] * u + horizon[1] * v + horizon[2] - s * norm
-    k = s / (f * norm)
-    gu, gv = horizon[0] - k * x, horizon[1] - k * y
-    return value, math.sqrt(gu * gu + gv * gv)
+    k = s * inv / norm
+    return value, horizon[0] - k * x, horizon[1] - k * y
+
+
+@kernel
+def _side(uc: float, vc: float, hu: float, hv: float, horizon: Array, camera: Array) -> int:
+    """SKY or GRASS if a block of half sizes hu, hv around (uc, vc) shows only that, -1 if it may show the horizon."""
+    margin = (CUT * camera[5] + 1e-3) * horizon[4]
+    value, gu, gv = _dip_function(uc, vc, horizon, camera)
+    if value + abs(gu) * hu + abs(gv) * hv < -margin:
+        return SKY
+    if value > margin:
+        for i in range(4):
+            value, gu, gv = _dip_function(uc + (hu if i & 1 else -hu), vc + (hv if i & 2 else -hv), horizon, camera)
+            if value <= margin:
+                return -1
+        return GRASS
+    return -1
 
 
 @kernel
 def _classify(
     u0: int, v0: int, w: int, h: int, lines: Array, seen: np.ndarray, count: int, horizon: Array, camera: Array,
     active: np.ndarray, edges: np.ndarray,
-) -> tuple[int, int, int]:  # fmt: skip
-    """What a block of pixels shows: (material below all, or -1 for the horizon; first and end of `active`).
+) -> tuple[int, int]:  # fmt: skip
+    """What a block of pixels shows: (material below all, or -1 for the horizon; first of `active`).
 
-    active[first:end] are the quadrilaterals with an edge in the block, bottom first, drawn over that material; edges
+    active[first:count] are the quadrilaterals with an edge in the block, bottom first, drawn over that material; edges
     is the bit mask of those edges.
     """
     hu, hv = 0.5 * (w - 1), 0.5 * (h - 1)
@@ -136,6 +166,8 @@ def _classify(
     full = TABLE_SIZE + SLACK
     first = count
     for m in range(count - 1, -1, -1):
+        if u0 > seen[m, 2] or u0 + w <= seen[m, 1] or v0 > seen[m, 4] or v0 + h <= seen[m, 3]:
+            continue
         mask = 0
         visible = True
         for i in range(4):
@@ -150,19 +182,11 @@ def _classify(
         if not visible:
             continue
         if mask == 0:
-            return seen[m], first, count
+            return seen[m, 0], first
         first -= 1
         active[first] = m
         edges[first] = mask
-    margin = (CUT * camera[5] + 1e-3) * horizon[4]
-    value, slope = _dip_function(uc, vc, horizon, camera)
-    if value + slope * math.hypot(hu, hv) < -margin:
-        return SKY, first, count
-    lowest = value
-    for i in range(4):
-        value, _ = _dip_function(uc + (hu if i & 1 else -hu), vc + (hv if i & 2 else -hv), horizon, camera)
-        lowest = min(lowest, value)
-    return (GRASS if lowest > margin else -1), first, count
+    return _side(uc, vc, hu, hv, horizon, camera), first
 
 
 @kernel
@@ -177,53 +201,79 @@ def _beyond(x: float, table: Array) -> float:
 
 
 @kernel
-def _draw_horizon(row: Array, u0: int, v: int, horizon: Array, camera: Array, palette: Array, table: Array) -> None:
+def _draw_horizon(
+    block: Array, w: int, h: int, u0: int, v0: int, horizon: Array, camera: Array, palette: Array, table: Array
+) -> None:
     units = TABLE_HALF / (CUT * camera[5])
-    for c in range(row.shape[0]):
-        value, slope = _dip_function(u0 + c, v, horizon, camera)
-        sky = _beyond(units * (value / max(slope, 1e-30)) + TABLE_HALF, table)
-        row[c] = (1.0 - sky) * palette[GRASS] + sky * palette[SKY]
+    ground, sky = palette[GRASS], palette[SKY]
+    half = 0.5 * (w - 1)
+    for r in range(h):
+        v = v0 + r
+        side = _side(u0 + half, v, half, 0.0, horizon, camera)
+        if side >= 0:
+            for c in range(w):
+                block[r, c] = palette[side]
+            continue
+        for c in range(w):
+            value, gu, gv = _dip_function(u0 + c, v, horizon, camera)
+            beyond = _beyond(value * (units / max(math.sqrt(gu * gu + gv * gv), 1e-30)) + TABLE_HALF, table)
+            block[r, c] = (1.0 - beyond) * ground + beyond * sky
 
 
 @kernel
-def _draw_quad(row: Array, u0: int, v: int, line: Array, mask: int, grey: float, table: Array) -> None:
-    """Compose one quadrilateral over one row. Edges outside `mask` are known to be far inside."""
-    lo, hi = 0, row.shape[0]
-    for i in range(4):
-        if mask >> i & 1:
-            a = line[i, 0]
-            offset = line[i, 1] * v + line[i, 2]
-            # Narrow to the part of the row not beyond this edge, one pixel generous: there alpha is exactly zero.
-            if abs(a) > 1e-9:
-                zero = min(max(-offset / a - u0, -2.0), row.shape[0] + 2.0)
+def _draw_quad(
+    block: Array, w: int, h: int, u0: int, v0: int, line: Array, box: np.ndarray, mask: int, grey: float, table: Array
+) -> None:
+    """Compose one quadrilateral over a block; edges outside `mask` are known to be far inside.
+
+    In each row, columns lo..hi are not wholly beyond an edge (one pixel generous), columns inside_lo..inside_hi wholly
+    inside all (one pixel stingy): elsewhere alpha is exactly 0 or 1.
+    """
+    a0, b0, c0 = line[0, 0], line[0, 1], line[0, 2]
+    a1, b1, c1 = line[1, 0], line[1, 1], line[1, 2]
+    a2, b2, c2 = line[2, 0], line[2, 1], line[2, 2]
+    a3, b3, c3 = line[3, 0], line[3, 1], line[3, 2]
+    box_lo, box_hi = max(0, box[1] - u0), min(w, box[2] + 1 - u0)
+    for r in range(max(0, box[3] - v0), min(h, box[4] + 1 - v0)):
+        v = v0 + r
+        e0, e1, e2, e3 = b0 * v + c0, b1 * v + c1, b2 * v + c2, b3 * v + c3
+        lo, hi, inside_lo, inside_hi = box_lo, box_hi, 0, w
+        for i in range(4):
+            if mask >> i & 1 == 0:
+                continue
+            a = a0 if i == 0 else (a1 if i == 1 else (a2 if i == 2 else a3))
+            e = e0 if i == 0 else (e1 if i == 1 else (e2 if i == 2 else e3))
+            # Values at the row's ends settle most rows without a division.
+            at_lo, at_hi = a * u0 + e, a * (u0 + w - 1) + e
+            least, most = min(at_lo, at_hi), max(at_lo, at_hi)
+            if least >= TABLE_SIZE + SLACK:
+                continue
+            if most <= -SLACK:
+                hi = lo
+            elif least < -SLACK or most > TABLE_SIZE + SLACK:
+                zero = min(max(-at_lo / a, -2.0), w + 2.0)
+                full = min(max((TABLE_SIZE - at_lo) / a, -3.0), w + 3.0)
                 if a > 0.0:
                     lo = max(lo, int(zero) - 1)
+                    inside_lo = max(inside_lo, int(full) + 2)
                 else:
                     hi = min(hi, int(zero) + 2)
-            elif offset < -1.0:
-                return
-    a0, e0 = line[0, 0], line[0, 1] * v + line[0, 2]
-    a1, e1 = line[1, 0], line[1, 1] * v + line[1, 2]
-    a2, e2 = line[2, 0], line[2, 1] * v + line[2, 2]
-    a3, e3 = line[3, 0], line[3, 1] * v + line[3, 2]
-    one_edge = mask & (mask - 1) == 0
-    if one_edge:
-        if mask == 2:
-            a0, e0 = a1, e1
-        elif mask == 4:
-            a0, e0 = a2, e2
-        elif mask == 8:
-            a0, e0 = a3, e3
-        for c in range(lo, hi):
-            alpha = 1.0 - _beyond(a0 * (u0 + c) + e0, table)
-            row[c] = alpha * grey + (1.0 - alpha) * row[c]
-        return
-    for c in range(lo, hi):
-        u = u0 + c
-        across = max(0.0, 1.0 - (_beyond(a0 * u + e0, table) + _beyond(a2 * u + e2, table)))
-        along = max(0.0, 1.0 - (_beyond(a1 * u + e1, table) + _beyond(a3 * u + e3, table)))
-        alpha = across * along
-        row[c] = alpha * grey + (1.0 - alpha) * row[c]
+                    inside_hi = min(inside_hi, int(full) - 1)
+            else:
+                inside_hi = 0
+        if inside_lo >= inside_hi:
+            inside_lo = inside_hi = hi
+        for c in range(inside_lo, inside_hi):
+            block[r, c] = grey
+        start, stop = lo, inside_lo
+        for _ in range(2):
+            for c in range(start, stop):
+                u = u0 + c
+                across = max(0.0, 1.0 - (_beyond(a0 * u + e0, table) + _beyond(a2 * u + e2, table)))
+                along = max(0.0, 1.0 - (_beyond(a1 * u + e1, table) + _beyond(a3 * u + e3, table)))
+                alpha = across * along
+                block[r, c] = alpha * grey + (1.0 - alpha) * block[r, c]
+            start, stop = inside_hi, hi
 
 
 @kernel
@@ -235,112 +285,97 @@ def mix(x: np.uint64) -> np.uint64:
 
 
 @kernel
-def _develop(
-    out: np.ndarray, r: int, c0: int, row: Array, u0: int, v: int, stream: np.uint64, lens: Array, quantiles: np.ndarray
-) -> None:
-    """Lens gain and offset, sensor noise and quantisation of one row; lens (3,): gain, offset, noise sigma.
-
-    The noise of pixel (u, v) is 16 bits of the hash of its counter (four pixels share one hash), through a table of
-    Gaussian quantiles.
-    """
-    gain, offset, sigma = lens[0], lens[1], lens[2]
-    bits = np.uint64(0)
-    for c in range(row.shape[0]):
-        u = u0 + c
-        if c == 0 or u & 3 == 0:
-            counter = np.uint64((v << 20) | (u >> 2))
-            bits = mix(stream + (counter + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15))
-        draw = quantiles[(bits >> np.uint64((u & 3) << 4)) & np.uint64(0xFFFF)]
-        value = row[c] * gain + offset + sigma * draw + 0.5
-        out[r, c0 + c] = np.uint8(min(max(value, 0.0), 255.0))
-
-
-@kernel
 def stream_of(key: np.uint64, index: int) -> np.uint64:
     """Start of the noise sequence of frame `index`."""
     return mix(mix(key) + np.uint64(index) * np.uint64(0xD1B54A32D192ED03))
 
 
 @kernel
-def _block(
-    out: np.ndarray, r0: int, c0: int, u0: int, v0: int, w: int, h: int,
-    lines: Array, seen: np.ndarray, counts: np.ndarray, horizon: Array, camera: Array, palette: Array, lens: Array,
-    table: Array, quantiles: np.ndarray, stream: np.uint64, filled: np.ndarray,
-    active: np.ndarray, edges: np.ndarray, row: Array, total: Array,
-) -> None:  # fmt: skip
-    """Pixels u0.., v0.. of size w x h into out[r0.., c0..]: the mean over the sub-exposures, then lens and noise.
+def _develop(
+    out: np.ndarray, row: Array, u0: int, v: int, stream: np.uint64, lens: Array, quantiles: np.ndarray, noise: Array
+) -> None:
+    """Lens gain and offset, sensor noise and quantisation of one row; lens (3,): gain, offset, noise sigma.
 
-    filled: (height, width) uint8 materials painted beforehand, used where the block has no edge; or empty.
+    The noise of pixel (u, v) is 16 bits of the hash of its counter (four pixels share one hash), through a table of
+    Gaussian quantiles. noise (>= w + 6,) is working space.
     """
-    subs = lines.shape[0]
-    base = np.empty(subs, np.int64)
-    first = np.empty(subs, np.int64)
-    flat = filled.size > 0
-    for k in range(subs):
-        base[k], first[k], _ = _classify(
-            u0, v0, w, h, lines[k], seen[k], counts[k], horizon[k], camera, active[k], edges[k]
-        )
-        flat &= base[k] >= 0 and first[k] == counts[k]
-    for r in range(h):
-        v = v0 + r
-        total[:w] = 0.0
+    gain, offset, sigma = lens[0], lens[1], lens[2]
+    w = out.shape[0]
+    skip = u0 & 3
+    if sigma > 0.0:
+        groups = (skip + w + 3) >> 2
+        counter = stream + np.uint64((v << 20) + (u0 >> 2) + 1) * np.uint64(0x9E3779B97F4A7C15)
+        for g in range(groups):
+            bits = mix(counter)
+            counter += np.uint64(0x9E3779B97F4A7C15)
+            for lane in range(4):
+                noise[4 * g + lane] = sigma * quantiles[(bits >> np.uint64(16 * lane)) & np.uint64(0xFFFF)]
+    else:
+        noise[: w + 6] = 0.0
+    drawn = noise[skip : skip + w]
+    for c in range(w):
+        value = row[c] * gain + offset + drawn[c] + 0.5
+        value = value if value > 0.0 else 0.0
+        out[c] = np.uint8(value if value < 255.0 else 255.0)
+
+
+@kernel
+def shade(
+    out: np.ndarray, corners: np.ndarray, w: int, h: int, filled: np.ndarray,
+    lines: Array, seen: np.ndarray, counts: np.ndarray, horizon: Array, camera: Array, palette: Array, lens: Array,
+    table: Array, quantiles: np.ndarray, key: np.uint64, index: int,
+) -> bool:  # fmt: skip
+    """Blocks of w x h pixels with their top-left pixels at corners (n, 2) [u0, v0], as uint8.
+
+    filled empty: `out` (n h, w) takes the blocks one below the other; False, and nothing done, if one leaves the frame.
+    filled (height, width) uint8, materials painted beforehand: `out` is the frame, each block goes to its place (less
+    what sticks out of the frame), and blocks without an edge are made of what is painted there.
+
+    A frame is the mean over its sub-exposures (first axis of lines, seen, counts, horizon), then lens and noise.
+    """
+    width, height = int(camera[3]), int(camera[4])
+    stacked = filled.size == 0
+    if stacked:
+        for i in range(corners.shape[0]):
+            u0, v0 = corners[i, 0], corners[i, 1]
+            if u0 < 0 or v0 < 0 or u0 + w > width or v0 + h > height:
+                return False
+    subs = counts.shape[0]
+    active, edges = np.empty(seen.shape[:2], np.int64), np.empty(seen.shape[:2], np.int64)
+    base, first = np.empty(subs, np.int64), np.empty(subs, np.int64)
+    block, total, noise = np.empty((h, w)), np.empty((h, w)), np.empty(w + 6)
+    stream = stream_of(key, index)
+    for i in range(corners.shape[0]):
+        u0, v0 = corners[i, 0], corners[i, 1]
+        r0, c0 = (i * h, 0) if stacked else (v0, u0)
+        bw, bh = min(w, width - u0), min(h, height - v0)
+        flat = not stacked
+        for k in range(subs):
+            base[k], first[k] = _classify(
+                u0, v0, bw, bh, lines[k], seen[k], counts[k], horizon[k], camera, active[k], edges[k]
+            )
+            flat = flat and base[k] >= 0 and first[k] == counts[k]
         for k in range(subs):
             if flat:
-                for c in range(w):
-                    row[c] = palette[filled[v, u0 + c]]
+                for r in range(bh):
+                    for c in range(bw):
+                        block[r, c] = palette[filled[v0 + r, u0 + c]]
             elif base[k] < 0:
-                _draw_horizon(row[:w], u0, v, horizon[k], camera, palette, table)
+                _draw_horizon(block, bw, bh, u0, v0, horizon[k], camera, palette, table)
             else:
-                row[:w] = palette[base[k]]
+                block[:] = palette[base[k]]
             for j in range(first[k], counts[k]):
                 m = active[k, j]
-                _draw_quad(row[:w], u0, v, lines[k, m], edges[k, j], palette[seen[k, m]], table)
-            total[:w] += row[:w]
-        total[:w] /= subs
-        _develop(out, r0 + r, c0, total[:w], u0, v, stream, lens, quantiles)
-
-
-@kernel
-def shade_windows(
-    corners: np.ndarray, w: int, h: int,
-    lines: Array, seen: np.ndarray, counts: np.ndarray, horizon: Array, camera: Array, palette: Array, lens: Array,
-    table: Array, quantiles: np.ndarray, key: np.uint64, index: int,
-) -> np.ndarray:  # fmt: skip
-    """(n, h, w) uint8 for n corners (n, 2) [u0, v0]."""
-    n = corners.shape[0]
-    out = np.empty((n * h, w), np.uint8)
-    active, edges = np.empty(seen.shape, np.int64), np.empty(seen.shape, np.int64)
-    row, total = np.empty(w), np.empty(w)
-    nothing = np.empty((0, 0), np.uint8)
-    stream = stream_of(key, index)
-    for i in range(n):
-        _block(
-            out, i * h, 0, corners[i, 0], corners[i, 1], w, h, lines, seen, counts, horizon, camera, palette, lens,
-            table, quantiles, stream, nothing, active, edges, row, total,
-        )  # fmt: skip
-    return out.reshape((n, h, w))
-
-
-@kernel
-def shade_frame(
-    filled: np.ndarray,
-    lines: Array, seen: np.ndarray, counts: np.ndarray, horizon: Array, camera: Array, palette: Array, lens: Array,
-    table: Array, quantiles: np.ndarray, key: np.uint64, index: int,
-) -> np.ndarray:  # fmt: skip
-    """(height, width) uint8: interiors from `filled`, every block with an edge in it from its exact profile."""
-    height, width = filled.shape
-    out = np.empty((height, width), np.uint8)
-    active, edges = np.empty(seen.shape, np.int64), np.empty(seen.shape, np.int64)
-    row, total = np.empty(TILE), np.empty(TILE)
-    stream = stream_of(key, index)
-    for v0 in range(0, height, TILE):
-        for u0 in range(0, width, TILE):
-            w, h = min(TILE, width - u0), min(TILE, height - v0)
-            _block(
-                out, v0, u0, u0, v0, w, h, lines, seen, counts, horizon, camera, palette, lens,
-                table, quantiles, stream, filled, active, edges, row, total,
-            )  # fmt: skip
-    return out
+                grey = palette[seen[k, m, 0]]
+                _draw_quad(block, bw, bh, u0, v0, lines[k, m], seen[k, m], edges[k, j], grey, table)
+            if subs > 1:
+                for r in range(bh):
+                    for c in range(bw):
+                        total[r, c] = block[r, c] / subs + (total[r, c] if k else 0.0)
+        drawn = total if subs > 1 else block
+        for r in range(bh):
+            _develop(out[r0 + r, c0 : c0 + bw], drawn[r], u0, v0 + r, stream, lens, quantiles, noise)
+    return True
 
 
 @kernel
@@ -348,7 +383,8 @@ def develop_frame(image: Array, lens: Array, quantiles: np.ndarray, key: np.uint
     """(height, width) uint8 of an image drawn elsewhere: lens, noise and quantisation as in all frames."""
     height, width = image.shape
     out = np.empty((height, width), np.uint8)
+    noise = np.empty(width + 6)
     stream = stream_of(key, index)
     for v in range(height):
-        _develop(out, v, 0, image[v], 0, v, stream, lens, quantiles)
+        _develop(out[v], image[v], 0, v, stream, lens, quantiles, noise)
     return out
