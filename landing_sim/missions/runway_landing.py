@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -153,7 +152,7 @@ def build(scenario: Scenario, vehicle: Vehicle, seed: int, run: int = 0) -> Miss
             sensors,
             _front_ends(scenario, camera, noise("acquisition")),
             _estimator(scenario, vehicle, camera, noise("believed")),
-            LandingGuidance(vehicle.guidance, planned.points[0].localizer_slope),
+            LandingGuidance(vehicle.guidance),
             LandingController(planned),
         ),
     )
@@ -332,10 +331,15 @@ def _control_settings(scenario: Scenario, vehicle: Vehicle) -> ControlSettings:
     return replace(c, longitudinal=replace(c.longitudinal, rho=rho), lateral=replace(c.lateral, rho=rho))
 
 
-@lru_cache(maxsize=8)
+_designs: dict[tuple[Path, str], Design] = {}
+
+
 def _design(folder: Path, settings: ControlSettings) -> Design:
-    """Gains from the nominal aircraft, never from the dispersed one."""
-    return design(settings, linear_models(folder, settings))
+    """Gains from the nominal aircraft, never from the dispersed one; made once a process."""
+    key = (folder, repr(settings))
+    if key not in _designs:
+        _designs[key] = design(settings, linear_models(folder, settings))
+    return _designs[key]
 
 
 def linear_models(folder: Path, settings: ControlSettings) -> list[LinearModel]:
