@@ -155,24 +155,31 @@ def follow(A: Array, B: Array, K_d: Array, R1: Array, Q0: Array, R: Array, rho: 
 def achieved(
     A: Array, B: Array, K: Array, modes: Sequence[Mode], names: Sequence[str], scale: Array
 ) -> tuple[Achieved, ...]:
-    """The modes of A - B K, each paired with the mode asked for that it is nearest to (all pairs together)."""
+    """The modes of A - B K, each paired with the mode asked for that it is nearest to in eigenvalue and shape."""
     values, vectors = np.linalg.eig(A - B @ K)
+    vectors = vectors / scale[:, None]
     slots = [(mode, s) for mode in modes for s in ((mode.eigenvalue, mode.eigenvalue.conjugate())[: mode.order])]
-    cost = np.array([[abs(value - s) / abs(s) for value in values] for _, s in slots])
+    fits = [[_fit(mode, names, scale, v) for v in vectors.T] for mode, _ in slots]
+    cost = np.array([[abs(value - s) / abs(s) + fit[1] for value, fit in zip(values, row)]
+                     for (_, s), row in zip(slots, fits)])  # fmt: skip
     _, column = linear_sum_assignment(cost)
     found = []
     for i, (mode, s) in enumerate(slots):
-        if s != mode.eigenvalue:
-            continue
-        rows, wanted = _wanted(mode, names, scale)
-        vector = vectors[:, column[i]] / scale
-        if rows.size:
-            factor = np.vdot(vector[rows], wanted) / np.vdot(vector[rows], vector[rows]).real
-            error = float(np.linalg.norm(factor * vector[rows] - wanted) / np.linalg.norm(wanted))
-        else:
-            factor, error = 1.0 / vector[np.argmax(np.abs(vector))], 0.0
-        found.append(Achieved(mode.name, s, complex(values[column[i]]), factor * vector * scale, error))
+        if s == mode.eigenvalue:
+            k = int(column[i])
+            factor, error = fits[i][k]
+            found.append(Achieved(mode.name, s, complex(values[k]), factor * vectors[:, k] * scale, error))
     return tuple(found)
+
+
+def _fit(mode: Mode, names: Sequence[str], scale: Array, vector: np.ndarray) -> tuple[complex, float]:
+    """The factor that brings a scaled eigenvector nearest to the wanted shape, and what is left, relative to it."""
+    rows, wanted = _wanted(mode, names, scale)
+    if not rows.size:
+        return complex(1.0 / vector[np.argmax(np.abs(vector))]), 0.0
+    part = vector[rows]
+    factor = complex(np.vdot(part, wanted) / max(np.vdot(part, part).real, 1e-30))
+    return factor, float(np.linalg.norm(factor * part - wanted) / np.linalg.norm(wanted))
 
 
 def margins(

@@ -166,6 +166,7 @@ class LandingGuidance:
             "acceleration": V_slope * m.x_dot,  # [m/s²] of the airspeed
             "pull": curvature * m.x_dot * m.x_dot,  # [m/s²] of the path, > 0 upwards
             "sideslip": aligned * crab,  # [rad]
+            "crosswind": memory.crosswind,  # [m/s] with which crab and sideslip are meant
             "wheel_height": height,  # [m]
         }
         return Reference(memory.mode, V, b.H + error, slope * m.x_dot, y, psi, phi, 0.0, r, extra)

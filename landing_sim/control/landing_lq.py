@@ -138,7 +138,9 @@ class LandingController:
         if abs(elevator) > self._limits[0][0]:
             int_H = memory.int_H
         slip = V * extra("sideslip", 0.0)
-        e_v = m.v_air - slip
+        # A gust faster than the crosswind that heading is corrected for must not be taken for sideslip: with heading
+        # gone uncorrected, feedback of v is feedback of course.
+        e_v = m.v_air + (b.wy - extra("crosswind", b.wy)) * math.cos(b.psi) * math.cos(b.phi) - slip
         e_r = b.r - ref.r_ff
         e_ph = b.phi - ref.phi - ph_slip * slip
         e_ps = math.remainder(b.psi - ref.psi, 2.0 * math.pi)
