@@ -37,6 +37,8 @@ class Limit:
 
 @dataclass(frozen=True, slots=True)
 class Criterion:
+    """A limit and the value that met it or not."""
+
     name: str
     value: float
     limit: float | tuple[float, float]
@@ -46,6 +48,8 @@ class Criterion:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
+    """What became of a flight."""
+
     outcome: Outcome
     metrics: Mapping[str, float]
     errors: Mapping[str, Mapping[str, Any]]
@@ -185,6 +189,7 @@ def consistency(log: FlightLog) -> dict[str, float]:
 
 
 def touchdown_json(log: FlightLog) -> dict[str, float] | None:
+    """The touchdown in degrees, as `run --json` prints it; None if there was none."""
     touchdown, degrees = log.touchdown, math.degrees(1.0)
     if touchdown is None:
         return None
