@@ -136,7 +136,7 @@ class JsbsimPlant:
         if self._platform is not None:
             self._platform.reset(*self._start_angles)
         self._trim, p_R, theta, speed = self._stand() if s.on_ground else self._fly()
-        self._written: tuple[float, ...] = ()
+        self._written: Command | None = None
 
         R_RB = so3.from_euler(0.0, theta, s.psi)
         geodetic = self._frame.R_to_geodetic(p_R + R_RB @ self._offset_B)
@@ -145,6 +145,10 @@ class JsbsimPlant:
         model.controls(self._trim.elevator, 0.0, 0.0, self._trim.throttle, s.flap)
         model.place(geodetic, so3.to_euler(R_NR @ R_RB), R_RB.T @ v_R)
         self._refresh()
+        self._attitude()
+        least = heights(self._body.p_R, self._body.R_RB, self._slope, self._contacts.p_B, self._height)
+        if least < 0.0 and not s.on_ground:
+            raise PlantError(f"the flight would begin {-least:.2f} m below the runway's surface: start higher")
         self._wheels(Command())
         self._wind_N = (R_NR @ self._wind_R0).tolist()
         model.release(self._wind_N)
@@ -155,8 +159,11 @@ class JsbsimPlant:
         s = self._initial
         p_R = np.array([s.x, s.y, -s.height])
         latitude, longitude, height = self._frame.R_to_geodetic(p_R)
-        point = trim(self._folder, s.airspeed, s.gamma, s.flap, height=height, place=(latitude, longitude),
-                     model=self._model)  # fmt: skip
+        clearance = s.height - s.x * self._tan_slope
+        point = trim(
+            self._folder, s.airspeed, s.gamma, s.flap, height=height, clearance=clearance, place=(latitude, longitude),
+            model=self._model,
+        )  # fmt: skip
         return point, p_R, point.theta, s.airspeed * np.array([math.cos(point.alpha), 0.0, math.sin(point.alpha)])
 
     def _stand(self) -> tuple[TrimPoint, Array, float, Array]:
@@ -208,10 +215,15 @@ class JsbsimPlant:
         self._wheels(command)
 
     def _write(self, command: Command) -> None:
-        wanted = (command.elevator, command.aileron, command.rudder, command.throttle, command.flap)
-        if wanted != self._written:
-            self._model.controls(*wanted)
-            self._written = wanted
+        if command is self._written:
+            return
+        c = command
+        if not math.isfinite(
+            c.elevator + c.aileron + c.rudder + c.throttle + c.flap + c.brake_left + c.brake_right + c.pan + c.tilt
+        ):  # JSBSim would clip it to a number
+            raise PlantError(f"a command is not finite: {command}")
+        self._model.controls(c.elevator, c.aileron, c.rudder, c.throttle, c.flap)
+        self._written = command
 
     def _refresh(self) -> None:
         """Position, rates and the terrain below, which JSBSim needs for the ground effect; near it, attitude too."""

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from landing_sim.plants.jsbsim import FlightModel, PlantError
+from landing_sim.plants.jsbsim import FT, FlightModel, PlantError
 from landing_sim.types import Array
 
 STATES = ("u", "v", "w", "p", "q", "r", "phi", "theta", "psi", "x", "y", "H")
@@ -56,11 +56,11 @@ class LinearModel:
 
 def trim(
     folder: Path, airspeed: float, gamma: float, flap: float, mass: float | None = None, height: float = 50.0,
-    cg_offset_B: Array | None = None, place: tuple[float, float] = PLACE, model: FlightModel | None = None,
+    cg_offset_B: Array | None = None, clearance: float = math.inf, place: tuple[float, float] = PLACE, model: FlightModel | None = None,
 ) -> TrimPoint:  # fmt: skip
-    """Find alpha, elevator and throttle for steady flight `height` [m] above sea level, out of ground effect.
+    """Find alpha, elevator and throttle for steady flight `height` [m] above sea level, `clearance` [m] above ground.
 
-    `model` saves loading one. Raises PlantError, with what is missing, where there is no such flight.
+    Infinitely far from it there is no ground effect. `model` saves loading one. Raises PlantError, with what is missing, where there is no such flight.
     """
     m = FlightModel(folder, 0.005, mass, cg_offset_B) if model is None else model
 
@@ -68,7 +68,7 @@ def trim(
         """du, dw [m/s^2], dq [rad/s^2] for alpha, elevator, throttle."""
         alpha = float(z[0])
         m.controls(float(z[1]), 0.0, 0.0, float(z[2]), flap)
-        m.set_terrain_ft(NO_GROUND)
+        m.set_terrain_ft(max(NO_GROUND, (height - clearance) / FT))
         uvw = airspeed * np.array([math.cos(alpha), 0.0, math.sin(alpha)])
         m.place((*place, height), np.array([0.0, alpha + gamma, 0.0]), uvw)
         return m.accelerations()[0][[0, 2, 4]]
