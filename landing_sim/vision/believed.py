@@ -1,0 +1,142 @@
+"""What the onboard side believes about the runway and its camera. Truth may differ; nothing here is read from it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from landing_sim.geometry.pinhole import Intrinsics
+from landing_sim.signals import Feature
+from landing_sim.types import Array
+
+
+# Aiming points and touchdown zones of both directions of a 29 m x 1680 m runway, mark pairs as one box: ICAO Annex 14,
+# vol. I, 5.2.5 and 5.2.6, with the lateral positions moved inwards to leave 3 m to the edges.
+AIMING_AND_TOUCHDOWN = tuple(
+    (x0, x0 + dx, -outer, outer)
+    for x, dx, outer in ((150.0, 22.5, 8.5), (300.0, 45.0, 11.5), (450.0, 22.5, 8.5), (600.0, 22.5, 8.5))
+    for x0 in (x, 1680.0 - dx - x)
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ThresholdStripes:
+    """Longitudinal stripes behind the threshold: `count` of them, `width` wide and `gap` apart, twice that at the centre.
+
+    Source     ICAO Annex 14, vol. I, 5.2.4: stripes of about 1.80 m with spacings of about 1.80 m, double spacing at
+               the centre line, starting 6 m from the threshold, at least 30 m long.
+    """
+
+    count: int = 6
+    width: float = 1.8  # [m]
+    gap: float = 1.8
+    start: float = 6.0
+    length: float = 30.0
+
+    def __post_init__(self) -> None:
+        if self.count < 0 or self.count % 2:
+            raise ValueError(f"threshold stripes: count must be even and >= 0 (half on each side), not {self.count}")
+
+    @property
+    def outermost(self) -> float:
+        """|y| [m] of the outer side of the last stripe; 0 without stripes."""
+        half = self.count // 2
+        return self.gap + half * self.width + (half - 1) * self.gap if half else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class TaxiwayMouth:
+    """Where a taxiway interrupts a borderline, flares included: x0..x1 [m] on the side of `feature` LEFT or RIGHT."""
+
+    x0: float
+    x1: float
+    feature: Feature
+
+    def __post_init__(self) -> None:
+        if not self.x0 < self.x1:
+            raise ValueError(f"taxiway mouth: x0 must be below x1, got {self.x0} and {self.x1}")
+        if self.feature not in (Feature.LEFT, Feature.RIGHT):
+            raise ValueError("taxiway mouth: it lies on the LEFT or on the RIGHT borderline")
+
+
+@dataclass(frozen=True, slots=True)
+class RunwayMap:
+    """The runway as the onboard side believes it to be.
+
+    width, length [m]; slope [rad] > 0 uphill along x; `paint` are further painted rectangles (x0, x1, y0, y1) [m] that a
+    search for a borderline must not reach (the default fits the default size); `brighter`: the runway is brighter than its surroundings, which decides the
+    polarity of its edges (the sky is always taken as brighter than the ground).
+    """
+
+    width: float = 29.0
+    length: float = 1680.0
+    slope: float = 0.0
+    stripes: ThresholdStripes = ThresholdStripes()
+    mouths: tuple[TaxiwayMouth, ...] = ()
+    paint: tuple[tuple[float, float, float, float], ...] = AIMING_AND_TOUCHDOWN
+    brighter: bool = True
+
+    def __post_init__(self) -> None:
+        if not (self.width > 0.0 and math.isfinite(self.width)):
+            raise ValueError(f"runway map: width must be > 0 m, not {self.width}")
+        if not (self.length > 0.0 and math.isfinite(self.length)):
+            raise ValueError(f"runway map: length must be > 0 m, not {self.length}")
+        if not abs(self.slope) < 0.2:
+            raise ValueError(f"runway map: slope is in rad and must be below 0.2, not {self.slope}")
+        if 2.0 * self.stripes.outermost >= self.width:
+            raise ValueError(
+                f"runway map: threshold stripes reach {self.stripes.outermost} m from the centre line, wider than the "
+                f"runway ({self.width} m); use fewer stripes"
+            )
+
+    def clean_strips(self) -> Array:
+        """(k, 2) [m] y0, y1: lateral intervals where no stripe follows the threshold, the outer ones first.
+
+        With 6 stripes on 29 m: 3.7 m at each side, 3.6 m at the centre. Elsewhere the stripe's own edge, 6 m in, is only
+        0.7 px behind the threshold's at 950 m and would pull a window's measurement inwards.
+        """
+        half, outer = 0.5 * self.width, self.stripes.outermost
+        if outer == 0.0:
+            return np.array([[-half, 0.0], [0.0, half]])
+        return np.array([[-half, -outer], [outer, half], [-self.stripes.gap, self.stripes.gap]])
+
+    def border_paint(self) -> Array:
+        """(m, 4) x0, x1 [m], Feature, clear distance [m] from that borderline inwards to the paint."""
+        half, rows = 0.5 * self.width, []
+        boxes = list(self.paint)
+        if self.stripes.count:
+            s = self.stripes
+            boxes.append((s.start, s.start + s.length, -s.outermost, s.outermost))
+            far = self.length - s.start
+            boxes.append((far - s.length, far, -s.outermost, s.outermost))
+        for x0, x1, y0, y1 in boxes:
+            if min(y0 + half, half - y1) > 0.8 * half:
+                continue  # the centre line is in nobody's way
+            rows.append((x0, x1, float(Feature.LEFT), y0 + half))
+            rows.append((x0, x1, float(Feature.RIGHT), half - y1))
+        return np.array(rows, dtype=float).reshape(-1, 4)
+
+    def mouth_rows(self) -> Array:
+        """(m, 3) x0, x1 [m], Feature."""
+        return np.array([(m.x0, m.x1, float(m.feature)) for m in self.mouths], dtype=float).reshape(-1, 3)
+
+
+@dataclass(frozen=True, slots=True)
+class BelievedCamera:
+    """The camera as the onboard side believes it to be.
+
+    p_BC (3,) [m] lever from the cg, frame B; blur [px] sigma of the optics; noise [grey levels] sigma of a pixel;
+    encoder_sigma [rad] of the platform's constant error, which an acquired attitude inherits.
+    """
+
+    intrinsics: Intrinsics
+    p_BC: tuple[float, float, float] = (3.0, 0.0, -0.3)
+    blur: float = 0.7
+    noise: float = 4.0
+    encoder_sigma: float = math.radians(0.03)
+
+    def __post_init__(self) -> None:
+        if not (self.blur > 0.0 and self.noise >= 0.0 and self.encoder_sigma >= 0.0):
+            raise ValueError("believed camera: blur must be > 0 px, noise and encoder_sigma >= 0")

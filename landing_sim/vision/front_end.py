@@ -1,0 +1,81 @@
+"""The camera's front end: pixels into edge displacements, or into a pose when nothing is known yet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from landing_sim.signals import CameraSample, EdgeSet, Estimate, Measurement, Sample
+from landing_sim.types import Array
+from landing_sim.vision.acquisition import Acquisition, AcquisitionConfig
+from landing_sim.vision.believed import BelievedCamera, RunwayMap
+from landing_sim.vision.windows import EdgeConfig, Scheme, SearchConfig, WindowPlanner
+
+POSE = ("x", "y", "H", "phi", "theta", "psi")
+
+
+@dataclass(frozen=True, slots=True)
+class FrontEndConfig:
+    """scheme: windows by feature, see `Scheme`. platform_angle: whether the filter is told what the encoders read or what
+    was commanded (all that a system without encoders knows)."""
+
+    scheme: str = "3L3R2T2H"
+    platform_angle: Literal["encoder", "commanded"] = "encoder"
+    search: SearchConfig = field(default_factory=SearchConfig)
+    edges: EdgeConfig = field(default_factory=EdgeConfig)
+    acquisition: AcquisitionConfig = field(default_factory=AcquisitionConfig)
+
+    def __post_init__(self) -> None:
+        Scheme.parse(self.scheme)
+        if self.platform_angle not in ("encoder", "commanded"):
+            raise ValueError(f"platform_angle: must be 'encoder' or 'commanded', not {self.platform_angle!r}")
+
+
+class RunwayFrontEnd:
+    """interfaces.FrontEnd for the sensor "camera".
+
+    While the estimate is not valid, or says that it is lost, each image is searched for the runway: a measurement "pose" (x,
+    y, H of the cg, phi, theta, psi; R (6, 6)), or none, with `reason` telling why. Else windows are placed by prediction:
+    a measurement "edges" with R (n,) variances [px^2].
+
+    Holds no memory between frames but `reason`, which nothing reads back.
+    """
+
+    __slots__ = ("_acquisition", "_columns", "_counts", "_encoder", "_names", "_planner", "_unknown", "reason", "sensor")
+
+    def __init__(self, runway: RunwayMap, camera: BelievedCamera, config: FrontEndConfig | None = None) -> None:
+        config = config or FrontEndConfig()
+        self.sensor = "camera"
+        self.reason = ""
+        self._planner = WindowPlanner(runway, camera, config.search, config.edges)
+        self._acquisition = Acquisition(runway, camera, config.acquisition, config.edges)
+        self._counts = Scheme.parse(config.scheme).counts
+        self._encoder = config.platform_angle == "encoder"
+        self._unknown: Array = np.diag([10.0, 2.0, 1.0, 0.01, 0.01, 0.01]) ** 2  # for an estimator without covariance
+        self._names: tuple[str, ...] = ()
+        self._columns = np.empty(0, dtype=np.int64)
+
+    def process(self, sample: Sample, estimate: Estimate) -> tuple[Measurement, ...]:
+        """`estimate` at sample.t_valid. Raises ValueError for an estimate that lacks one of x, y, H, phi, theta, psi."""
+        data: CameraSample = sample.data
+        pan, tilt = (data.pan, data.tilt) if self._encoder else (data.pan_cmd, data.tilt_cmd)
+        if not estimate.valid or estimate.flags.get("lost", False):
+            got = self._acquisition.acquire(data, pan, tilt)
+            self.reason = got.reason
+            if got.z is None or got.R is None:
+                return ()
+            return (Measurement("pose", sample.t_valid, sample.t_arrival, got.z, got.R),)
+        if estimate.names is not self._names:
+            missing = [name for name in POSE if name not in estimate.names]
+            if missing:
+                raise ValueError(f"camera front end: the estimate lacks {', '.join(missing)}; it needs {', '.join(POSE)}")
+            self._names = estimate.names
+            self._columns = np.array([estimate.names.index(name) for name in POSE])
+        cols = self._columns
+        cov = self._unknown if estimate.cov is None else estimate.cov[cols[:, None], cols]
+        w = self._planner.place(estimate.mean[cols], cov, pan, tilt, self._counts)
+        z, variance, _, status = self._planner.measure(data.frame, w)
+        edges = EdgeSet(w.feature, w.centre, w.direction, status, pan, tilt)
+        return (Measurement("edges", sample.t_valid, sample.t_arrival, z, variance, edges),)

@@ -1,0 +1,210 @@
+"""Lines of an unknown runway in a whole image: edge points, the horizon, and two borders with a common vanishing point.
+
+All exhaustive and deterministic: no draws, so nothing to seed.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from landing_sim.jit import kernel
+from landing_sim.types import Array
+
+SMOOTH = 2.0  # [px] sigma of the derivative filter
+_BINS = 360  # directions about the vanishing point, half a degree each
+
+
+def edge_points(image: np.ndarray, noise: float, snr: float) -> Array:
+    """(n, 4) u, v [px], gradient gu, gv [grey levels/px] at its ridge: where it exceeds snr times its noise.
+
+    Derivatives of a Gaussian, suppressed to local maxima across the edge, sub-pixel by a parabola.
+    """
+    import cv2
+
+    radius = int(3.0 * SMOOTH)
+    k = np.arange(-radius, radius + 1, dtype=float)
+    g = np.exp(-0.5 * (k / SMOOTH) ** 2)
+    g /= g.sum()
+    d = k * g / (k * k * g).sum()
+    gu = cv2.sepFilter2D(image, cv2.CV_32F, d, g)
+    gv = cv2.sepFilter2D(image, cv2.CV_32F, g, d)
+    # one grey level of rounding at least: a noise-free image has edges too
+    sigma = math.sqrt(noise * noise + 1.0 / 12.0) * math.sqrt((g * g).sum() * (d * d).sum())
+    return _ridges(gu, gv, max(snr * sigma, 0.3), radius)  # type: ignore[no-any-return]
+
+
+@kernel
+def _ridges(gu: np.ndarray, gv: np.ndarray, least: float, border: int) -> Array:
+    h, w = gu.shape
+    out, n = np.empty((h * w // 4, 4)), 0
+    for v in range(border, h - border):
+        for u in range(border, w - border):
+            a, b = float(gu[v, u]), float(gv[v, u])
+            m = math.sqrt(a * a + b * b)
+            if m < least:
+                continue
+            du, dv = (1, 0) if abs(a) >= abs(b) else (0, 1)
+            m0 = math.sqrt(gu[v - dv, u - du] ** 2 + gv[v - dv, u - du] ** 2)
+            m1 = math.sqrt(gu[v + dv, u + du] ** 2 + gv[v + dv, u + du] ** 2)
+            if m > m0 and m >= m1 and n < len(out):
+                s = 0.5 * (m1 - m0) / (2.0 * m - m0 - m1)
+                out[n, 0], out[n, 1], out[n, 2], out[n, 3] = u + s * du, v + s * dv, a, b
+                n += 1
+    return out[:n].copy()
+
+
+@kernel
+def _bits(x: np.uint64) -> int:
+    n = 0
+    while x != np.uint64(0):
+        x &= x - np.uint64(1)
+        n += 1
+    return n
+
+
+@kernel
+def horizon_line(points: Array, width: int, height: int, max_roll: float, share: float) -> tuple[bool, float, float]:
+    """found, a, b of the horizon v = a + b u: of the edges with the bright side up, the one that spans most columns.
+
+    Votes are counted once per column group, so that length counts and not density. Of all lines that span at least 0.8 of
+    the best one the uppermost is taken; it must span `share` of the image. Refined by least squares with inliers within
+    2 px. |roll| <= max_roll [rad].
+    """
+    n_roll, step = 2 * int(max_roll / 0.004) + 1, 1.5
+    n_bins = int((height + 2.0 * width * math.tan(max_roll)) / step) + 2
+    low = -width * math.tan(max_roll)
+    a = b = 0.0
+    votes = np.zeros((n_roll, n_bins), dtype=np.uint64)
+    for i in range(len(points)):
+        u, v, gu, gv = points[i]
+        if gv >= 0.0:
+            continue
+        column = np.uint64(1) << np.uint64(int(64.0 * u / width))
+        centre = -gu / gv  # slope of the edge there: only rolls near it are voted for
+        for r in range(n_roll):
+            slope = math.tan((r - n_roll // 2) * 0.004)
+            if abs(slope - centre) < 0.25:
+                votes[r, int((v - slope * u - low) / step)] |= column
+    best_span, limit = 0, np.inf
+    while True:  # the longest line, then any nearly as long one clearly above it
+        longest, best_v = 0, 0.0
+        for r in range(n_roll):
+            slope = math.tan((r - n_roll // 2) * 0.004)
+            for k in range(n_bins - 1):
+                v = low + (k + 1.0) * step + slope * 0.5 * width
+                if v < limit - 12.0:
+                    span = _bits(votes[r, k] | votes[r, k + 1])
+                    if span > longest and span >= 0.8 * best_span:
+                        longest, best_v, b = span, v, slope
+        if longest == 0:
+            break
+        best_span, limit = max(best_span, longest), best_v
+        a = best_v - b * 0.5 * width
+    if best_span < share * 64.0:
+        return False, 0.0, 0.0
+    for _ in range(4):
+        s0 = su = sv = suu = suv = 0.0
+        for i in range(len(points)):
+            u, v, gu, gv = points[i]
+            if gv < 0.0 and abs(v - a - b * u) < 4.0:
+                u -= 0.5 * width
+                s0, su, sv, suu, suv = s0 + 1.0, su + u, sv + v, suu + u * u, suv + u * v
+        det = s0 * suu - su * su
+        if det <= 0.0:
+            return False, 0.0, 0.0
+        b = (s0 * suv - su * sv) / det
+        a = (sv - b * su) / s0 - b * 0.5 * width
+    return True, a, b
+
+
+@kernel
+def borders(
+    points: Array, R_LC: Array, lens: Array, slope: float, polarity: float, headings: Array, k_min: float, k_max: float
+) -> tuple[float, float, float, float]:
+    """score, heading [rad], K_left, K_right of the pair of lines that looks most like a runway's borders.
+
+    In the levelled frame L (x along the optical axis, horizontal; z down) the runway runs at an unknown heading. A straight
+    line along it, b to the right and h below the camera (normal to its surface), is the set of rays with b / h = K. For
+    each heading tried the edge points are sorted by atan K and by whether brightness rises with K; the left border is
+    a rising one (polarity +1), the right border a falling one, k_min <= K_right - K_left <= k_max. Score: the geometric
+    mean of the points of both.
+    """
+    n = len(points)
+    rising, falling = np.zeros(_BINS + 2), np.zeros(_BINS + 2)
+    best, heading, left, right = 0.0, 0.0, 0.0, 0.0
+    cs, ss = math.cos(slope), math.sin(slope)
+    for t in range(len(headings)):
+        ca, sa = math.cos(headings[t]), math.sin(headings[t])
+        rising[:] = 0.0
+        falling[:] = 0.0
+        # y' and depth below the camera, both linear in (u, v, 1)
+        y, w = np.empty(3), np.empty(3)
+        for c in range(3):
+            x_c = ca * R_LC[0, c] + sa * R_LC[1, c]
+            y[c] = -sa * R_LC[0, c] + ca * R_LC[1, c]
+            w[c] = ss * x_c + cs * R_LC[2, c]
+        for i in range(n):
+            a, b = (points[i, 0] - lens[1]) / lens[0], (points[i, 1] - lens[2]) / lens[0]
+            p, q = y[0] * a + y[1] * b + y[2], w[0] * a + w[1] * b + w[2]
+            if q <= 1e-3:  # above or at the horizon
+                continue
+            du, dv = y[0] * q - p * w[0], y[1] * q - p * w[1]  # gradient of K, up to scale
+            along = du * points[i, 2] + dv * points[i, 3]
+            if along * along < 0.85 * (du * du + dv * dv) * (points[i, 2] ** 2 + points[i, 3] ** 2):
+                continue
+            k = int((math.atan2(p, q) / math.pi + 0.5) * _BINS) + 1
+            if along * polarity > 0.0:
+                rising[k] += 1.0
+            else:
+                falling[k] += 1.0
+        for i in range(1, _BINS + 1):
+            L = 0.5 * rising[i - 1] + rising[i] + 0.5 * rising[i + 1]
+            if L * n <= best * best:
+                continue
+            k_l = math.tan((i - 0.5) / _BINS * math.pi - 0.5 * math.pi)
+            for j in range(i + 1, _BINS + 1):
+                F = 0.5 * falling[j - 1] + falling[j] + 0.5 * falling[j + 1]
+                if L * F > best * best:
+                    k_r = math.tan((j - 0.5) / _BINS * math.pi - 0.5 * math.pi)
+                    if k_min <= k_r - k_l <= k_max:
+                        best, heading, left, right = math.sqrt(L * F), headings[t], k_l, k_r
+    return best, heading, left, right
+
+
+@kernel
+def depth_profile(
+    image: np.ndarray, R_CD: Array, lens: Array, height: float, offsets: Array, nearest: float, count: int
+) -> Array:
+    """(count,) grey levels along the runway, averaged over parallel lines, at equal steps in the image.
+
+    R_CD: from the runway's directions (along, right, down normal to it) to C; height [m] above its surface; offsets [m] of
+    the lines to the right of the camera. Entry i lies at the distance 1 / (nearest - i / (height f)) ahead, nearest in 1/m;
+    NaN where no line is in the image.
+    """
+    out = np.full(count, np.nan)
+    h, w = image.shape
+    for i in range(count):
+        rho = nearest - i / (height * lens[0])
+        if rho <= 0.0:
+            break
+        total, seen = 0.0, 0
+        for k in range(len(offsets)):
+            # the ray to (1 / rho, offset, height), scaled by rho
+            x = R_CD[0, 0] + rho * (R_CD[0, 1] * offsets[k] + R_CD[0, 2] * height)
+            y = R_CD[1, 0] + rho * (R_CD[1, 1] * offsets[k] + R_CD[1, 2] * height)
+            z = R_CD[2, 0] + rho * (R_CD[2, 1] * offsets[k] + R_CD[2, 2] * height)
+            if z <= 0.0:
+                continue
+            u, v = lens[1] + lens[0] * x / z, lens[2] + lens[0] * y / z
+            if 0.0 <= u < w - 1.0 and 0.0 <= v < h - 1.0:
+                iu, iv = int(u), int(v)
+                a, b = u - iu, v - iv
+                top = image[iv, iu] + a * (float(image[iv, iu + 1]) - float(image[iv, iu]))
+                bottom = image[iv + 1, iu] + a * (float(image[iv + 1, iu + 1]) - float(image[iv + 1, iu]))
+                total += top + b * (bottom - top)
+                seen += 1
+        if seen > 0:
+            out[i] = total / seen
+    return out

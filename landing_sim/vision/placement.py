@@ -1,0 +1,312 @@
+"""Putting windows on the predicted lines: the compiled part of `windows`.
+
+A window is a row of two arrays: floats F (n, 12) and integers I (n, 6), in the columns named below. Along its predicted line
+each gets an exact centre, a search path, a mask length and a search range; what cannot be looked at keeps its row and gets
+a status.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from landing_sim.geometry.runway_image import HORIZON, LEFT, RIGHT, THRESHOLD, displacement
+from landing_sim.jit import kernel
+from landing_sim.types import Array
+from landing_sim.vision.masks import REACH
+from landing_sim.vision.prediction import NEAR, View, cut, dot, feature_line, in_image, look, oriented, spread
+
+CENTRE, DIRECTION, STEP, ALONG, ORIGIN, NORMAL_STEP, OFFSET = 0, 2, 4, 6, 8, 10, 11  # columns of F; the first five take two
+FEATURE, STATUS, HALF, SEARCH, CORNER = 0, 1, 2, 3, 4  # columns of I; CORNER takes two
+MASK, SIGMAS, SEARCH_MIN, SEARCH_MAX, EXTRA_SIGMA, SEPARATION = 0, 1, 2, 3, 4, 5  # fields of the rule
+
+_OK, _OUT, _MAPPED, _SHORT = 0, 1, 4, 5  # values of signals.Status
+_SHEAR = 3.0  # a threshold window's path follows the runway's image up to this slant
+_CLEAR = 2.0  # [px] between a mask and another edge
+_BESIDE = 1.5  # [px] between the end of a threshold mask and paint beside it: there, room is short
+_PROFILE = 4.5  # steps from the edge that the mask's profile reaches
+_PLACES = 17  # places tried around each regular one, 1/32 of the line apart
+
+
+@kernel
+def _path(l: Array, du: float, dv: float) -> tuple[float, float, float, float, float]:
+    """Step, along and normal advance of a window on the unit line l that searches along (du, dv), l . (du, dv) > 0.
+
+    (0, 0) searches along the pixel axis nearer to the normal.
+    """
+    if abs(l[1]) >= abs(l[0]):
+        su = min(_SHEAR, max(-_SHEAR, du / abs(dv))) if dv != 0.0 else 0.0
+        sv, au, av = math.copysign(1.0, l[1]), 1.0, -l[0] / l[1]
+    else:
+        sv = min(_SHEAR, max(-_SHEAR, dv / abs(du))) if du != 0.0 else 0.0
+        su, au, av = math.copysign(1.0, l[0]), -l[1] / l[0], 1.0
+    return su, sv, au, av, l[0] * su + l[1] * sv
+
+
+@kernel
+def _range(rule: Array, sigma: float, advance: float) -> float:
+    """Search half-width [steps]."""
+    return min(rule[SEARCH_MAX], max(rule[SEARCH_MIN], math.ceil(rule[SIGMAS] * sigma / advance)))
+
+
+@kernel
+def _on_line(l: Array, u: float, v: float) -> tuple[float, float]:
+    """The point of l near (u, v) that is whole along the edge, so that nothing is interpolated there."""
+    if abs(l[1]) >= abs(l[0]):
+        u = float(round(u))
+        return u, -(l[0] * u + l[2]) / l[1]
+    v = float(round(v))
+    return -(l[1] * v + l[2]) / l[0], v
+
+
+@kernel
+def _put(
+    F: Array, I: np.ndarray, at: int, u: float, v: float, su: float, sv: float, au: float, av: float, advance: float,
+    half: int, search: float,
+) -> None:  # fmt: skip
+    size = math.hypot(su, sv)
+    F[at, CENTRE], F[at, CENTRE + 1] = u, v
+    F[at, DIRECTION], F[at, DIRECTION + 1] = su / size, sv / size
+    F[at, STEP], F[at, STEP + 1], F[at, ALONG], F[at, ALONG + 1] = su, sv, au, av
+    F[at, NORMAL_STEP] = advance
+    I[at, STATUS], I[at, HALF], I[at, SEARCH] = _OK, half, int(search)
+
+
+@kernel
+def _footprint(
+    view: View, side: int, u: float, v: float, su: float, sv: float, au: float, av: float, half: int, reach: float
+) -> tuple[float, float, float]:
+    """s0, s1, depth [m]: the stretch of runway a mask at (u, v) sees, and how far it looks inwards of the borderline."""
+    s0, s1, depth = math.inf, -math.inf, 0.0
+    border = (side - 0.5) * view.runway[0]
+    for i in range(4):
+        a, r = (half + 0.5) * (1 if i % 2 else -1), reach if i // 2 else 0.0
+        x, y = u + a * au + r * su, v + a * av + r * sv
+        g = view.ground
+        w = g[2, 0] * x + g[2, 1] * y + g[2, 2]
+        s = (g[0, 0] * x + g[0, 1] * y + g[0, 2]) / w
+        s0, s1 = min(s0, s), max(s1, s)
+        depth = max(depth, ((g[1, 0] * x + g[1, 1] * y + g[1, 2]) / w - border) * (1.0 if side == LEFT else -1.0))
+    return s0, s1, depth
+
+
+@kernel
+def _blocked(rows: Array, side: int, s0: float, s1: float, depth: float) -> bool:
+    """Whether a footprint meets one of the rows x0, x1, Feature, clear distance."""
+    for k in range(len(rows)):
+        if rows[k, 2] == side and s1 > rows[k, 0] and s0 < rows[k, 1] and depth > rows[k, 3]:
+            return True
+    return False
+
+
+@kernel
+def _place_border(
+    F: Array, I: np.ndarray, at: int, n: int, side: int, view: View, sigma: float, rule: Array, paint: Array, mouths: Array
+) -> None:
+    """n windows in rows at.. on the visible part of a borderline, spread from its near to its far end.
+
+    Kept clear of the corners and of where the borderlines and the horizon converge; those at a mapped taxiway mouth are
+    dropped. Of the places around each regular one the first is taken where no paint is within the search range; else
+    within the smallest one; else within the mask itself, the test for ambiguity standing guard; else with a short mask.
+    """
+    for i in range(at, at + n):
+        I[i, FEATURE], I[i, STATUS] = side, _OUT
+    l, length, half = view.lines[side], view.runway[1], int(rule[MASK]) // 2
+    su, sv, au, av, advance = _path(l, 0.0, 0.0)
+    wanted = _range(rule, sigma, advance)
+    mu = (wanted + REACH) * abs(su) + half * abs(au) + 2.0
+    mv = (wanted + REACH) * abs(sv) + half * abs(av) + 2.0
+    q0, qd = view.threshold + (side - 0.5) * view.runway[0] * view.across, view.along
+    lo, hi = in_image(q0, qd, 0.0, length, mu, mv, view.frame)
+    if lo >= hi:
+        return
+    for i in range(at, at + n):
+        I[i, STATUS] = _SHORT
+    other, sky, row, apart = view.lines[1 - side], view.lines[HORIZON], view.lines[THRESHOLD], rule[SEPARATION]
+    lo, hi = cut(dot(other, q0) - apart * q0[2], dot(other, qd) - apart * qd[2], lo, hi)
+    lo, hi = cut(-dot(sky, q0) - apart * q0[2], -dot(sky, qd) - apart * qd[2], lo, hi)
+    if lo >= hi:
+        return
+    q_a, q_b = q0 + lo * qd, q0 + hi * qd
+    a_u, a_v = q_a[0] / q_a[2], q_a[1] / q_a[2]
+    d_u, d_v = q_b[0] / q_b[2] - a_u, q_b[1] / q_b[2] - a_v
+    # the mask, the runway's side of its profile included, stays clear of the threshold and of the far end
+    depth = half * abs(row[0] * au + row[1] * av) + _CLEAR + 3.5 * max(0.0, -(row[0] * su + row[1] * sv))
+    inset = depth / max(1e-9, abs(row[0] * d_u + row[1] * d_v))
+    t0, t1 = inset if lo <= 0.0 else 0.0, 1.0 - (inset if hi >= length else 0.0)
+    span = (t1 - t0) * max(abs(d_u), abs(d_v))  # in pixels of the mask
+    if t1 < t0:
+        return
+    m = min(n, int(span / rule[MASK]) + 1)
+    for i in range(m):
+        wish = 0.5 if m == 1 else i / (m - 1.0)
+        for k in range(4 * _PLACES):
+            level, place = k // _PLACES, k % _PLACES
+            t = wish + (place // 2 + place % 2) * (1.0 if place % 2 else -1.0) / 32.0
+            if t < 0.0 or t > 1.0:
+                continue
+            t = t0 + t * (t1 - t0)
+            u, v = _on_line(l, a_u + t * d_u, a_v + t * d_v)
+            taken = False
+            for j in range(at, at + i):
+                if I[j, STATUS] == _OK:
+                    taken |= max(abs(F[j, CENTRE] - u), abs(F[j, CENTRE + 1] - v)) < rule[MASK]
+            if taken:
+                continue
+            h = half if level < 3 else min(half, 2)
+            search = wanted if level == 0 else min(wanted, rule[SEARCH_MIN])
+            reach = _PROFILE + (search + 1.0 if level < 2 else 0.0)
+            s0, s1, deep = _footprint(view, side, u, v, su, sv, au, av, h, reach)
+            if _blocked(paint, side, s0, s1, deep):
+                continue
+            _put(F, I, at + i, u, v, su, sv, au, av, advance, h, search)
+            s0, s1, deep = _footprint(view, side, u, v, su, sv, au, av, h, 0.0)
+            if _blocked(mouths, side, s0, s1, 0.0):
+                I[at + i, STATUS] = _MAPPED
+            break
+
+
+@kernel
+def _place_threshold(
+    F: Array, I: np.ndarray, at: int, n: int, view: View, sigma: float, rule: Array, strips: Array
+) -> int:
+    """n windows in rows at.. on the strips of the threshold that no paint follows; returns how many are in view.
+
+    They search along the runway's image, so that the profile stays in its strip, with masks as long as the strip allows.
+    """
+    for i in range(at, at + n):
+        I[i, FEATURE], I[i, STATUS] = THRESHOLD, _OUT
+    q, qd, row = view.threshold, view.along, view.lines[THRESHOLD]
+    if q[2] < NEAR:
+        return 0
+    t_u, t_v = qd[0] * q[2] - q[0] * qd[2], qd[1] * q[2] - q[1] * qd[2]
+    norm = math.hypot(t_u, t_v)
+    su, sv, au, av, advance = _path(row, t_u / norm, t_v / norm)
+    if advance < 0.1:  # the runway's image runs along the threshold's: search normal to it instead
+        su, sv, au, av, advance = _path(row, 0.0, 0.0)
+    search = _range(rule, sigma, advance)
+    blurred = 2.0 * _BESIDE * math.hypot(su, sv) / abs(su * av - sv * au)
+    n_strips, n_usable = len(strips), 0
+    ends, room = np.empty((n_strips, 4)), np.empty(n_strips)
+    for k in range(n_strips):
+        q_a, q_b = q + strips[k, 0] * view.across, q + strips[k, 1] * view.across
+        if q_a[2] < NEAR or q_b[2] < NEAR:
+            continue
+        e = ends[n_usable]
+        e[0], e[1] = q_a[0] / q_a[2], q_a[1] / q_a[2]
+        e[2], e[3] = q_b[0] / q_b[2] - e[0], q_b[1] / q_b[2] - e[1]
+        room[n_usable] = max(abs(e[2]), abs(e[3])) - blurred
+        if room[n_usable] >= 1.0:
+            n_usable += 1
+    seen, per_strip = 0, (n + n_usable - 1) // max(1, n_usable)
+    for turn in range(per_strip):
+        for k in range(n_usable):
+            half = int((min(rule[MASK], room[k]) - 1.0) / 2.0)
+            fit = min(per_strip, int(room[k] / (2 * half + 1)))
+            if seen == n or turn >= fit:
+                continue
+            t = (turn + 0.5) / fit
+            u, v = _on_line(row, ends[k, 0] + t * ends[k, 2], ends[k, 1] + t * ends[k, 3])
+            mu = (search + REACH) * abs(su) + half * abs(au) + 2.0
+            mv = (search + REACH) * abs(sv) + half * abs(av) + 2.0
+            if mu <= u <= view.frame[0] - 1.0 - mu and mv <= v <= view.frame[1] - 1.0 - mv:
+                _put(F, I, at + seen, u, v, su, sv, au, av, advance, half, search)
+                seen += 1
+    if n_usable == 0 and in_image(q, view.across, -0.5 * view.runway[0], 0.5 * view.runway[0], 0.0, 0.0, view.frame)[0] < 0.0:
+        for i in range(at, at + n):
+            I[i, STATUS] = _SHORT
+    return seen
+
+
+@kernel
+def _place_horizon(F: Array, I: np.ndarray, at: int, n: int, view: View, sigma: float, rule: Array) -> None:
+    """n windows in rows at.. spread over the horizon, where no runway lies right below it."""
+    sky, half = view.lines[HORIZON], int(rule[MASK]) // 2
+    su, sv, au, av, advance = _path(sky, 0.0, 0.0)
+    search = _range(rule, sigma, advance)
+    mu = (search + REACH) * abs(su) + half * abs(au) + 3.0
+    mv = (search + REACH) * abs(sv) + half * abs(av) + 3.0
+    upright = abs(sky[1]) >= abs(sky[0])
+    h0 = np.array([0.0, -sky[2] / sky[1], 1.0]) if upright else np.array([-sky[2] / sky[0], 0.0, 1.0])
+    hd = np.array([1.0, -sky[0] / sky[1], 0.0]) if upright else np.array([-sky[1] / sky[0], 1.0, 0.0])
+    lo, hi = in_image(h0, hd, -1e9, 1e9, mu, mv, view.frame)
+    below = rule[SEPARATION] + (search + REACH) * advance
+    for i in range(at, at + n):
+        I[i, FEATURE], I[i, STATUS] = HORIZON, _OUT
+        if lo >= hi:
+            continue
+        I[i, STATUS] = _SHORT
+        wish = 0.5 if n == 1 else (i - at) / (n - 1.0)
+        for k in range(65):
+            t = wish + (k // 2 + k % 2) * (1.0 if k % 2 else -1.0) / 32.0
+            if t < 0.0 or t > 1.0:
+                continue
+            q = h0 + (lo + t * (hi - lo)) * hd
+            u, v = q[0], q[1]
+            q[0] -= below * sky[0]
+            q[1] -= below * sky[1]
+            if min(dot(view.lines[LEFT], q), dot(view.lines[RIGHT], q)) > -(half + 1.0):
+                continue
+            l = sky
+            for _ in range(4):  # the horizon's line turns with the azimuth it is looked at
+                l = oriented(feature_line(HORIZON, view.p_RC, view.R_CR, view.lens, view.runway, u, v), view.up)
+                u, v = _on_line(l, u, v)
+            su, sv, au, av, advance = _path(l, 0.0, 0.0)
+            _put(F, I, i, u, v, su, sv, au, av, advance, half, search)
+            break
+
+
+@kernel
+def place(
+    pose: Array,
+    cov: Array,
+    pan: float,
+    tilt: float,
+    lever: Array,
+    lens: Array,
+    frame: Array,
+    runway: Array,
+    strips: Array,
+    paint: Array,
+    mouths: Array,
+    counts: np.ndarray,
+    rule: Array,
+) -> tuple[Array, np.ndarray, int, int]:
+    """F (n, 12), I (n, 6) and the width and height [px] of all windows.
+
+    pose (6,), cov (6, 6) of x, y, H of the cg, phi, theta, psi; lens: f, cx, cy; frame: width, height; runway: width,
+    length, slope; strips, paint, mouths as RunwayMap gives them; counts (4,) windows by Feature; rule: see the columns.
+    """
+    view = look(pose, lever, pan, tilt, lens, frame, runway)
+    sigma = spread(view, pose, cov, lever, pan, tilt, rule[EXTRA_SIGMA])
+    most = counts[0] + counts[1] + 2 * counts[2] + counts[3]
+    F, I = np.zeros((most, 12)), np.zeros((most, 6), dtype=np.int64)
+    F[:, : DIRECTION] = np.nan
+    n_T = counts[THRESHOLD]
+    seen = _place_threshold(F, I, 0, n_T, view, sigma[THRESHOLD], rule, strips)
+    n_L, n_R = counts[LEFT] + (n_T - seen + 1) // 2, counts[RIGHT] + (n_T - seen) // 2
+    _place_border(F, I, n_T, n_L, LEFT, view, sigma[LEFT], rule, paint, mouths)
+    _place_border(F, I, n_T + n_L, n_R, RIGHT, view, sigma[RIGHT], rule, paint, mouths)
+    _place_horizon(F, I, n_T + n_L + n_R, counts[HORIZON], view, sigma[HORIZON], rule)
+    n = n_T + n_L + n_R + counts[HORIZON]
+    F, I = F[:n], I[:n]
+
+    size = np.zeros(2, dtype=np.int64)
+    for i in range(n):
+        if I[i, STATUS] == _OK:
+            for c in range(2):
+                reach = (I[i, SEARCH] + REACH) * abs(F[i, STEP + c]) + I[i, HALF] * abs(F[i, ALONG + c])
+                size[c] = max(size[c], 2 * int(math.ceil(reach)) + 4)
+    for c in range(2):
+        size[c] = min(size[c], int(frame[c]))
+    for i in range(n):
+        if I[i, STATUS] == _OK:
+            c = 1 if F[i, ALONG] == 1.0 and abs(F[i, STEP + 1]) == 1.0 else 0
+            shift = (round(F[i, CENTRE + c]) - F[i, CENTRE + c]) * F[i, STEP + c]
+            F[i, OFFSET] = shift * math.hypot(F[i, STEP], F[i, STEP + 1])
+            for k in range(2):
+                F[i, ORIGIN + k] = F[i, CENTRE + k] + shift * F[i, STEP + k]
+                low = int(math.floor(F[i, CENTRE + k])) - size[k] // 2 + 1
+                I[i, CORNER + k] = min(int(frame[k]) - size[k], max(0, low))
+    return F, I, size[0], size[1]

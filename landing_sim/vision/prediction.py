@@ -1,0 +1,202 @@
+"""What the believed pose makes of the runway's edges in the image: lines, displacements and their uncertainty."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from landing_sim.geometry.runway_image import HORIZON, LEFT, RIGHT, THRESHOLD, displacement, image_line, plane_normal
+from landing_sim.geometry.so3 import camera_from_body, from_euler
+from landing_sim.jit import kernel
+from landing_sim.types import Array
+
+NEAR = 1.0  # [m] nothing nearer to the camera is looked at
+
+
+class View(NamedTuple):
+    """The scene from one believed camera. q: homogeneous image points; s [m] along the runway, y [m] to the right.
+
+    A point (s, y) of the runway's plane appears at q = threshold + s along + y across; ground = the inverse of that map.
+    Lines have unit normals towards the brighter side: into the runway, up to the sky.
+    """
+
+    p_RC: Array
+    R_CR: Array
+    lens: Array  # f, cx, cy [px]
+    frame: Array  # width, height [px]
+    runway: Array  # width, length [m], slope [rad]
+    along: Array
+    across: Array
+    threshold: Array
+    up: Array
+    ground: Array  # (3, 3)
+    lines: Array  # (4, 3) by Feature
+
+
+@kernel
+def camera_pose(pose: Array, lever: Array, pan: float, tilt: float) -> tuple[Array, Array]:
+    """p_RC (3,), R_CR (3, 3) of a camera on a body at pose (x, y, H of the cg, phi, theta, psi)."""
+    R_RB = from_euler(pose[3], pose[4], pose[5])
+    R_CB = camera_from_body(pan, tilt)
+    p, R = np.empty(3), np.empty((3, 3))
+    p[0], p[1], p[2] = pose[0], pose[1], -pose[2]
+    for i in range(3):
+        for j in range(3):
+            p[i] += R_RB[i, j] * lever[j]
+            R[i, j] = R_CB[i, 0] * R_RB[j, 0] + R_CB[i, 1] * R_RB[j, 1] + R_CB[i, 2] * R_RB[j, 2]
+    return p, R
+
+
+@kernel
+def feature_line(feature: int, p_RC: Array, R_CR: Array, lens: Array, runway: Array, u: float, v: float) -> Array:
+    """l (3,) of the feature; the horizon's where the ray of pixel (u, v) looks."""
+    azimuth = 0.0
+    if feature == HORIZON:
+        a, b = (u - lens[1]) / lens[0], (v - lens[2]) / lens[0]
+        azimuth = math.atan2(a * R_CR[0, 1] + b * R_CR[1, 1] + R_CR[2, 1], a * R_CR[0, 0] + b * R_CR[1, 0] + R_CR[2, 0])
+    n = plane_normal(feature, p_RC, runway[0], runway[2], azimuth)
+    return image_line(n, R_CR, lens[0], lens[1], lens[2])
+
+
+@kernel
+def dot(l: Array, q: Array) -> float:
+    return l[0] * q[0] + l[1] * q[1] + l[2] * q[2]
+
+
+@kernel
+def oriented(l: Array, q: Array) -> Array:
+    """l scaled to a unit normal, positive on the side of the homogeneous point or direction q."""
+    return l * ((1.0 if dot(l, q) >= 0.0 else -1.0) / math.hypot(l[0], l[1]))
+
+
+@kernel
+def _image_of(x: float, y: float, z: float, R: Array, lens: Array) -> Array:
+    q = np.empty(3)
+    a = R[0, 0] * x + R[0, 1] * y + R[0, 2] * z
+    b = R[1, 0] * x + R[1, 1] * y + R[1, 2] * z
+    q[2] = R[2, 0] * x + R[2, 1] * y + R[2, 2] * z
+    q[0], q[1] = lens[0] * a + lens[1] * q[2], lens[0] * b + lens[2] * q[2]
+    return q
+
+
+@kernel
+def _inverse(a: Array, b: Array, c: Array) -> Array:
+    """Inverse, up to scale, of the matrix with the columns a, b, c."""
+    out = np.empty((3, 3))
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        out[0, i] = b[j] * c[k] - b[k] * c[j]
+        out[1, i] = c[j] * a[k] - c[k] * a[j]
+        out[2, i] = a[j] * b[k] - a[k] * b[j]
+    return out
+
+
+@kernel
+def look(pose: Array, lever: Array, pan: float, tilt: float, lens: Array, frame: Array, runway: Array) -> View:
+    """The scene as it should appear from `pose`."""
+    p, R = camera_pose(pose, lever, pan, tilt)
+    along = _image_of(math.cos(runway[2]), 0.0, -math.sin(runway[2]), R, lens)
+    across = _image_of(0.0, 1.0, 0.0, R, lens)
+    threshold = _image_of(-p[0], -p[1], -p[2], R, lens)
+    up = _image_of(0.0, 0.0, -1.0, R, lens)
+    u, v = (along[0] / along[2], along[1] / along[2]) if along[2] > 0.0 else (lens[1], lens[2])
+    lines = np.empty((4, 3))
+    lines[LEFT] = oriented(feature_line(LEFT, p, R, lens, runway, u, v), across)
+    lines[RIGHT] = oriented(feature_line(RIGHT, p, R, lens, runway, u, v), -across)
+    lines[THRESHOLD] = oriented(feature_line(THRESHOLD, p, R, lens, runway, u, v), along)
+    lines[HORIZON] = oriented(feature_line(HORIZON, p, R, lens, runway, u, v), up)
+    return View(p, R, lens, frame, runway, along, across, threshold, up, _inverse(along, across, threshold), lines)
+
+
+@kernel
+def jacobian(
+    feature: np.ndarray,
+    centre: Array,
+    direction: Array,
+    pose: Array,
+    lever: Array,
+    pan: float,
+    tilt: float,
+    lens: Array,
+    runway: Array,
+) -> tuple[Array, Array]:
+    """Predicted displacements h (n,) [px] and dh/dpose (n, 6) by central differences."""
+    n = len(feature)
+    h, J = np.empty(n), np.empty((n, 6))
+    p, R = camera_pose(pose, lever, pan, tilt)
+    for i in range(n):
+        c, s = centre[i], direction[i]
+        h[i] = displacement(feature_line(feature[i], p, R, lens, runway, c[0], c[1]), c[0], c[1], s[0], s[1])
+    moved = pose.copy()
+    for j in range(6):
+        eps = 1e-3 if j < 3 else 1e-5
+        moved[j] = pose[j] + eps
+        p_up, R_up = camera_pose(moved, lever, pan, tilt)
+        moved[j] = pose[j] - eps
+        p_dn, R_dn = camera_pose(moved, lever, pan, tilt)
+        moved[j] = pose[j]
+        for i in range(n):
+            c, s = centre[i], direction[i]
+            up = feature_line(feature[i], p_up, R_up, lens, runway, c[0], c[1])
+            dn = feature_line(feature[i], p_dn, R_dn, lens, runway, c[0], c[1])
+            J[i, j] = displacement(up, c[0], c[1], s[0], s[1]) - displacement(dn, c[0], c[1], s[0], s[1])
+            J[i, j] /= 2.0 * eps
+    return h, J
+
+
+@kernel
+def cut(a: float, b: float, lo: float, hi: float) -> tuple[float, float]:
+    """The part of lo..hi where a + b s >= 0; lo > hi if there is none."""
+    if b > 0.0:
+        return max(lo, -a / b), hi
+    if b < 0.0:
+        return lo, min(hi, -a / b)
+    if a >= 0.0:
+        return lo, hi
+    return 1.0, 0.0
+
+
+@kernel
+def in_image(q0: Array, qd: Array, lo: float, hi: float, mu: float, mv: float, frame: Array) -> tuple[float, float]:
+    """The part of lo..hi for which the point q0 + qd s is in front and inside the margins mu, mv [px]. No divide."""
+    lo, hi = cut(q0[2] - NEAR, qd[2], lo, hi)
+    lo, hi = cut(q0[0] - mu * q0[2], qd[0] - mu * qd[2], lo, hi)
+    lo, hi = cut((frame[0] - 1.0 - mu) * q0[2] - q0[0], (frame[0] - 1.0 - mu) * qd[2] - qd[0], lo, hi)
+    lo, hi = cut(q0[1] - mv * q0[2], qd[1] - mv * qd[2], lo, hi)
+    return cut((frame[1] - 1.0 - mv) * q0[2] - q0[1], (frame[1] - 1.0 - mv) * qd[2] - qd[1], lo, hi)
+
+
+@kernel
+def spread(view: View, pose: Array, cov: Array, lever: Array, pan: float, tilt: float, extra: float) -> Array:
+    """sigma (4,) [px] of each feature's line normal to itself, the larger one of two places on it.
+
+    The places: the visible ends of a borderline, the corners for the threshold, and for the horizon (or whatever is not in
+    view) left and right of the centre. `extra` [px] is added in quadrature.
+    """
+    feature, centre, direction = np.empty(8, dtype=np.int64), np.empty((8, 2)), np.empty((8, 2))
+    for i in range(8):
+        side, which = i // 2, i % 2
+        feature[i] = side
+        direction[i, 0], direction[i, 1] = view.lines[side, 0], view.lines[side, 1]
+        centre[i, 0], centre[i, 1] = view.lens[1] + (which - 0.5) * 0.8 * view.frame[0], view.lens[2]
+        q = np.zeros(3)
+        if side == LEFT or side == RIGHT:
+            q0 = view.threshold + (side - 0.5) * view.runway[0] * view.across
+            lo, hi = in_image(q0, view.along, 0.0, view.runway[1], 0.0, 0.0, view.frame)
+            if lo < hi:
+                q = q0 + (lo if which == 0 else hi) * view.along
+        elif side == THRESHOLD:
+            q = view.threshold + (which - 0.5) * view.runway[0] * view.across
+        if q[2] >= 0.5 * NEAR:
+            centre[i, 0], centre[i, 1] = q[0] / q[2], q[1] / q[2]
+    _, J = jacobian(feature, centre, direction, pose, lever, pan, tilt, view.lens, view.runway)
+    sigma = np.zeros(4)
+    for i in range(8):
+        var = extra * extra
+        for j in range(6):
+            for k in range(6):
+                var += J[i, j] * cov[j, k] * J[i, k]
+        sigma[i // 2] = max(sigma[i // 2], math.sqrt(max(0.0, var)))
+    return sigma
