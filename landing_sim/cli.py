@@ -93,7 +93,16 @@ def design(
     json_: JsonOption = False,
 ) -> None:
     """Trim, modes wanted and achieved, gains, stability margins."""
-    raise NotImplementedError
+    from landing_sim import paths, vehicle
+    from landing_sim.control import design as control
+    from landing_sim.missions.runway_landing import linear_models
+
+    craft = vehicle.load(aircraft)
+    result = control.design(craft.control, linear_models(paths.aircraft_folder(aircraft), craft.control))
+    if json_:
+        typer.echo(json.dumps({"aircraft": aircraft, **control.design_dict(result)}, allow_nan=False))
+    else:
+        typer.echo(control.design_report(result, craft.name))
 
 
 @app.command()

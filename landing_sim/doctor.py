@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 import os
 import platform
 import re
@@ -28,7 +28,7 @@ def report(say: Callable[[str], None]) -> bool:
 
 
 def _python() -> str:
-    if sys.version_info < (3, 11):  # noqa: UP036: run from source, nothing else has looked
+    if sys.version_info < (3, 11):  # noqa: UP036
         raise RuntimeError(f"{platform.python_version()} is too old: 3.11 or newer is needed")
     return f"{platform.python_version()} at {sys.executable} on {platform.system()} {platform.machine()}"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import tempfile
@@ -11,14 +12,21 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from landing_sim.errors import Mark, Problem, ScenarioError
+from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.missions import runway_landing
 from landing_sim.record import judge, log, parquet
+from landing_sim.record.overlay import BelievedCamera
 from landing_sim.scenario import Scenario, dump
 from landing_sim.signals import Step
 from landing_sim.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from landing_sim.record.replay import Scene
 
 RESULT, LOG, RECORDING, SCENARIO = "result.json", "log.parquet", "recording.rrd", "scenario.json"
 _OURS = (RESULT, LOG, RECORDING, SCENARIO)
@@ -33,24 +41,72 @@ class Flight:
     wall_s: float
 
 
-def fly(scenario: Scenario, vehicle: Vehicle, seed: int, watch: Callable[[Step], None] | None = None) -> Flight:
-    """Fly it to its end. `watch` is called with every step (progress, live view)."""
+def fly(
+    scenario: Scenario,
+    vehicle: Vehicle,
+    watch: Callable[[Step], None] | None = None,
+    recording: Path | None = None,
+    live: bool = False,
+) -> Flight:
+    """Fly it to its end.
+
+    watch : called with every step
+    recording : where to write one for the viewer; None leaves it out
+    live : show it in the viewer while it flies; needs a recording
+
+    Raises PlantError where the aircraft cannot be put where the scenario wants it, ReplayError from the recording.
+    """
     started = time.perf_counter()
+    mission = runway_landing.build(scenario, vehicle, scenario.seed)
+    listeners = [] if watch is None else [watch]
+    recorder = None
+    if recording is not None:
+        from landing_sim.record.replay import Recorder
+
+        recorder = Recorder(recording, scene(scenario, vehicle), scenario.record.frames_hz, live)
+        listeners.append(recorder.add)
     builder = log.LogBuilder()
-    mission = runway_landing.build(scenario, vehicle, seed)
     for step in mission.steps():
         builder.add(step)
-        if watch is not None:
-            watch(step)
+        for listener in listeners:
+            listener(step)
     outcome = mission.outcome()
     flown = builder.finish(
         scenario=dump(scenario),
-        seed=seed,
+        seed=scenario.seed,
         touchdown=outcome.touchdown,
         end=outcome.end,
         runway={"width_m": scenario.runway.width_m, "length_m": scenario.runway.length_m},
     )
+    if recorder is not None:
+        recorder.close(flown)
     return Flight(flown, judge.judge(flown, limits(scenario)), time.perf_counter() - started)
+
+
+def scene(scenario: Scenario, vehicle: Vehicle) -> Scene:
+    """What stands still in a recording. Predicted edges are drawn as the onboard side believes them."""
+    from landing_sim.record.replay import Scene
+
+    camera, runway, believed = scenario.camera, scenario.runway, scenario.filter.believed_width_m
+    slope = math.atan(runway.slope_percent / 100.0)
+    start = scenario.initial
+    return Scene(
+        camera=BelievedCamera(
+            Intrinsics.centred(camera.width_px, camera.height_px, camera.focal_px * scenario.believed.focal_scale),
+            np.array(vehicle.camera.p_BC_m),
+            runway.width_m if believed is None else believed,
+            runway.length_m,
+            slope,
+        ),
+        width=runway.width_m,
+        length=runway.length_m,
+        slope=slope,
+        span=vehicle.size.span_m,
+        fuselage=vehicle.size.length_m,
+        markings=runway.markings,
+        start=(start.x_m, start.y_m, -start.height_m),
+        title=f"{scenario.name}, seed {scenario.seed}",
+    )
 
 
 def limits(scenario: Scenario) -> tuple[judge.Limit, ...]:
@@ -74,6 +130,8 @@ def check_out(folder: Path) -> None:
 
 
 def _is_run(folder: Path) -> bool:
+    if {entry.name for entry in folder.iterdir()} <= set(_OURS):
+        return True
     try:
         result = json.loads((folder / RESULT).read_text())
     except (OSError, ValueError):
@@ -98,12 +156,15 @@ def out_folder(folder: Path) -> Iterator[Path]:
         shutil.rmtree(work, ignore_errors=True)
 
 
-def write(flight: Flight, scenario: Scenario, work: Path, folder: Path) -> dict[str, Any]:
-    """Log, scenario as flown and result into `work`; the result as `run --json` prints it, naming files in `folder`."""
+def write(flight: Flight, scenario: Scenario, label: str, work: Path, folder: Path) -> dict[str, Any]:
+    """Log, scenario as flown and result into `work`; the result as `run --json` prints it, naming files in `folder`.
+
+    label : the scenario as the user named it
+    """
     parquet.write(flight.log, work / LOG)
     (work / SCENARIO).write_text(json.dumps(dump(scenario), indent=1) + "\n")
     files = {file.name.split(".")[0]: str(folder / file.name) for file in sorted(work.iterdir())}
     files["result"] = str(folder / RESULT)
-    result = judge.to_json(flight.log, flight.verdict, scenario=scenario.name, wall_s=flight.wall_s, files=files)
+    result = judge.to_json(flight.log, flight.verdict, scenario=label, wall_s=flight.wall_s, files=files)
     (work / RESULT).write_text(json.dumps(result, indent=1, allow_nan=False) + "\n")
     return result

@@ -88,7 +88,7 @@ def test_every_value_is_described() -> None:
 
 
 WRONG = {
-    "unknown key": ("wind:\n  turbulance: {}\n", r"s.yaml:4:3: wind.turbulance: unknown key \(did you mean 'turbulence'\?\)"),
+    "unknown key": ("wind:\n  turbulance: {}\n", r"s.yaml:4:3: wind.turbulance: unknown key .*mean 'turbulence'\?\)"),
     "wrong type": ("runway:\n  width_m: wide\n", r"s.yaml:4:12: runway.width_m: must be a valid number, not 'wide'"),
     "number as text": ("seed: '3'\n", r"s.yaml:3:7: seed: must be a valid integer, not '3'"),
     "truth value": ("initial: {x_m: true}\n", r"s.yaml:3:16: initial.x_m: must be a valid number, not true"),
@@ -106,7 +106,7 @@ WRONG = {
         r"s.yaml:3:20: camera.period_s: 0.07 is not a whole multiple of time.cycle_s = 0.06",
     ),
     "delay": ("control: {delay_s: 0.003}\n", r"s.yaml:3:20: control.delay_s: 0.003 is not a whole multiple"),
-    "aircraft": ("aircraft: {model: do127}\n", r"s.yaml:3:19: aircraft.model: no aircraft 'do127' \(did you mean 'do128'\?\)"),
+    "aircraft": ("aircraft: {model: do127}\n", r"s.yaml:3:19: aircraft.model: no aircraft 'do127' .*mean 'do128'\?\)"),
     "duplicate": ("seed: 1\nseed: 2\n", r"s.yaml:4:1: seed: duplicate key, first given on line 3"),
     "tag": ("name: !!python/object/apply:os.system [ls]\n", r"s.yaml:3:7: name: tags are not allowed"),
     "local tag": ("seed: !seed 3\n", r"s.yaml:3:7: seed: tags are not allowed: !seed"),
@@ -266,8 +266,9 @@ def test_whole_multiples_bear_rounding(tmp_path: Path) -> None:
 FUZZ = settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 WORDS = st.sampled_from(
     ["schema_version", "1", "mission", "runway_landing", "wind", "gust", "runway", "taxiways", "x_m", "{", "}", "[", "]",
-     ":", ": ", "- ", "\n", "\n  ", ",", "&a", "*a", "!!str", "!", "?", "|", ">", "'", '"', "#", "%YAML 1.1\n", "---", "...",
-     "null", ".nan", "1e999", "<<", "\t", "\u2028", "\ufeff", "\x85", "é", "0x", "0o9", "-", "@", "`", "%TAG ! x\n"]
+     ":", ": ", "- ", "\n", "\n  ", ",", "&a", "*a", "!!str", "!", "?", "|", ">", "'", '"', "#", "%YAML 1.1\n",
+     "null", "---", "...", ".nan", "1e999", "<<", "\t", "\u2028", "\ufeff", "\x85", "é", "0x", "0o9", "-", "@", "`",
+     "%TAG ! x\n"]
 )  # fmt: skip
 
 
@@ -287,21 +288,21 @@ def test_any_damage_to_a_good_file_does_too(tmp_path: Path, patch: str, at: int,
 @FUZZ
 @given(st.text(max_size=40))
 def test_any_set_does_too(tmp_path: Path, text: str) -> None:
-    try:
-        assert load(tmp_path, HEAD, text)
-    except ScenarioError as error:
-        assert error.problems
+    check_any(tmp_path, HEAD.encode(), text)
 
 
-def check_any(tmp_path: Path, raw: bytes) -> None:
+def check_any(tmp_path: Path, raw: bytes, *overrides: str) -> None:
+    """Anything but a scenario or a ScenarioError fails the test by itself."""
+    found: ScenarioError | None = None
     try:
-        assert isinstance(load(tmp_path, raw), scenario.Scenario)
+        loaded = load(tmp_path, raw, *overrides)
     except ScenarioError as error:
-        assert error.problems
-        for problem in error.problems:
-            assert problem.mark.line >= 1
-            assert problem.mark.column >= 1
-            assert problem.message
+        found = error
+    if found is None:
+        assert loaded.schema_version == 1
+        return
+    assert found.problems
+    assert all(p.mark.line >= 1 and p.mark.column >= 1 and p.message for p in found.problems)
 
 
 def test_a_model_cannot_be_built_inconsistent_in_code() -> None:
