@@ -45,6 +45,16 @@ class LinearModel:
     A: Array  # (12, 12)
     B: Array  # (12, 4)
 
+    @staticmethod
+    def straight(
+        airspeed: float, flight_path: float, mass: float, alpha: float, elevator: float, thrust: float, A: Array, B: Array
+    ) -> LinearModel:
+        """About steady straight flight with wings level."""
+        state = np.zeros(len(STATES))
+        state[0], state[2] = airspeed * math.cos(alpha), airspeed * math.sin(alpha)
+        state[7] = alpha + flight_path
+        return LinearModel(airspeed, flight_path, mass, state, np.array([elevator, thrust, 0.0, 0.0]), A, B)
+
 
 @dataclass(frozen=True, slots=True)
 class AxisDesign:

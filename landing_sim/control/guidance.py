@@ -31,8 +31,7 @@ class GuidanceMemory:
     seen: float = -math.inf  # [s] when the estimate was last valid
     crosswind: float = 0.0  # [m/s] smoothed
     waiting: float = 0.0  # [s] for how long touchdown or instability has been suspected
-    start_height: float = 0.0  # [m] of a go-around
-    start: float = 0.0  # [s] of a go-around
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of a go-around: time [s], height [m], climb rate [m/s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,8 +128,7 @@ class LandingGuidance:
             estimate.t if estimate.valid else memory.seen,
             crosswind,
             waiting,
-            b.H if started else memory.start_height,
-            estimate.t if started else memory.start,
+            (estimate.t, b.H, m.H_dot) if started else memory.start,
         )
         if mode == "rollout" or mode == "stopped":
             return memory, Reference(mode, 0.0, b.H, 0.0, 0.0, 0.0, 0.0)
@@ -168,16 +166,24 @@ class LandingGuidance:
             "sideslip": aligned * crab,  # [rad]
             "crosswind": memory.crosswind,  # [m/s] with which crab and sideslip are meant
             "wheel_height": height,  # [m]
+            "on_path": float(abs(H_path - height) < limit),
         }
         return Reference(memory.mode, V, b.H + error, slope * m.x_dot, y, psi, phi, 0.0, r, extra)
 
     def _go_around(self, memory: GuidanceMemory, b: Believed, m: Motion) -> Reference:
-        climb = self.path.approach * math.sin(math.radians(self.settings.go_around.climb_deg))
-        height = memory.start_height + climb * (memory.t - memory.start)
+        """Round out at a constant pull into a steady climb, wings level, heading kept along the runway."""
+        g = self.settings.go_around
+        climb = self.path.approach * math.sin(math.radians(g.climb_deg))
+        t0, H0, rate = memory.start
+        pulling = min(memory.t - t0, max(climb - rate, 0.0) / g.pull_mps2)
+        steady = memory.t - t0 - pulling
+        height = H0 + (rate + 0.5 * g.pull_mps2 * pulling) * pulling + climb * steady
         limit = self.settings.path.height_error_limit_m
         error = min(max(height - b.H, -limit), limit)
         crab = -memory.crosswind / max(m.airspeed, 0.5 * self.path.touchdown)
-        return Reference("go_around", self.path.approach, b.H + error, climb, b.y, crab, 0.0)
+        extra = {"pull": g.pull_mps2 if steady <= 0.0 else 0.0, "crosswind": memory.crosswind}
+        rate = climb if steady > 0.0 else rate + g.pull_mps2 * pulling
+        return Reference("go_around", self.path.approach, b.H + error, rate, b.y, crab, 0.0, extra=extra)
 
     # ------------------------------------------------------------------------------------------------ phases
 

@@ -131,11 +131,11 @@ class LandingController:
             kt_u * e_u + kt_w * e_w + kt_q * e_q + kt_th * e_th + kt_H * e_H + kt_iV * int_V + kt_iH * int_H
         )
         throttle = self._thrust.throttle(thrust, V)
-        # An integral whose actuator is at its end must not run on into it.
+        # An integral must not run on where its actuator is at its end or its error is not the true one.
         if not 0.0 <= throttle <= 1.0:
             int_V = memory.int_V if (throttle > 1.0) == (e_V < 0.0) else int_V
             throttle = min(max(throttle, 0.0), 1.0)
-        if abs(elevator) > self._limits[0][0]:
+        if abs(elevator) > self._limits[0][0] or not extra("on_path", 1.0):
             int_H = memory.int_H
         slip = V * extra("sideslip", 0.0)
         # A gust faster than the crosswind that heading is corrected for must not be taken for sideslip: with heading

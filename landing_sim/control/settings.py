@@ -282,8 +282,12 @@ class GoAroundSettings:
     unstable_s: float
     blackout_s: float
     climb_deg: float
+    pull_mps2: float = 1.5
 
     __pydantic_config__ = _STRICT
+
+    def __post_init__(self) -> None:
+        _positive(climb_deg=self.climb_deg, pull_mps2=self.pull_mps2)
 
 
 @dataclass(frozen=True, slots=True)
