@@ -72,9 +72,12 @@ def replay(
     recording = path / RECORDING if path.is_dir() else path
     if not recording.is_file():
         raise ConfigError([Problem(Mark(str(path)), (), f"no recording there: `landing-sim run` writes {RECORDING}")])
-    from landing_sim.record.replay import open_viewer
+    from landing_sim.record.replay import ReplayError, open_viewer
 
-    open_viewer(recording, web=web)
+    try:
+        open_viewer(recording, web=web)
+    except ReplayError as error:
+        raise ConfigError([Problem(Mark(str(recording)), (), str(error))]) from None
 
 
 @app.command()

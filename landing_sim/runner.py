@@ -19,6 +19,7 @@ import numpy as np
 from landing_sim.errors import Mark, Problem, ScenarioError
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.missions import runway_landing
+from landing_sim.plants.jsbsim import PlantError
 from landing_sim.record import judge, log, parquet
 from landing_sim.record.overlay import BelievedCamera
 from landing_sim.scenario import Scenario, dump
@@ -54,10 +55,13 @@ def fly(
     recording : where to write one for the viewer; None leaves it out
     live : show it in the viewer while it flies; needs a recording
 
-    Raises PlantError where the aircraft cannot be put where the scenario wants it, ReplayError from the recording.
+    Raises ScenarioError where the aircraft cannot fly what the scenario wants at the start, ReplayError from the recording.
     """
     started = time.perf_counter()
-    mission = runway_landing.build(scenario, vehicle, scenario.seed)
+    try:
+        mission = runway_landing.build(scenario, vehicle, scenario.seed)
+    except (PlantError, ValueError) as error:
+        raise ScenarioError([Problem(Mark(scenario.name), (), f"cannot be flown: {error}")]) from error
     listeners = [] if watch is None else [watch]
     recorder = None
     if recording is not None:
@@ -122,9 +126,6 @@ def check_out(folder: Path) -> None:
 
     if folder.exists() and not folder.is_dir():
         raise refuse("is a file, not a folder")
-    parent = next(p for p in (folder, *folder.absolute().parents) if p.exists())
-    if not os.access(parent, os.W_OK):
-        raise refuse("cannot be written to")
     if folder.is_dir() and any(folder.iterdir()) and not _is_run(folder):
         raise refuse("is not empty and holds no earlier run: name another folder, or empty it")
 
@@ -142,18 +143,36 @@ def _is_run(folder: Path) -> bool:
 @contextmanager
 def out_folder(folder: Path) -> Iterator[Path]:
     """A temporary folder whose files move to `folder` together when all of them are complete; else it vanishes."""
-    folder = folder.absolute()
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    work = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
+    absolute = folder.absolute()
+    made = next((p for p in reversed(absolute.parents) if not p.exists()), None)
+    try:
+        absolute.parent.mkdir(parents=True, exist_ok=True)
+        work = Path(tempfile.mkdtemp(dir=absolute.parent, prefix=f".{absolute.name}."))
+    except OSError as error:
+        raise ScenarioError([Problem(Mark(f"--out {folder}"), (), f"cannot be made: {error.strerror}")]) from None
     try:
         yield work
-        folder.mkdir(exist_ok=True)
+        absolute.mkdir(exist_ok=True)
         for name in _OURS:
-            (folder / name).unlink(missing_ok=True)
+            (absolute / name).unlink(missing_ok=True)
         for file in sorted(work.iterdir(), key=lambda p: p.name == RESULT):  # the result last: it marks a whole run
-            os.replace(file, folder / file.name)
+            os.replace(file, absolute / file.name)
     finally:
         shutil.rmtree(work, ignore_errors=True)
+        _remove_empty(absolute.parent, made)
+
+
+def _remove_empty(folder: Path, top: Path | None) -> None:
+    """Remove folders made on the way to results that never came, from `folder` up to `top`, as far as they are empty."""
+    if top is None:
+        return
+    for path in (folder, *folder.parents):
+        try:
+            path.rmdir()
+        except OSError:  # not empty: somebody's results, ours or another run's
+            return
+        if path == top:
+            return
 
 
 def write(flight: Flight, scenario: Scenario, label: str, work: Path, folder: Path) -> dict[str, Any]:
