@@ -68,12 +68,10 @@ def test_local_frames_differ_by_the_convergence_of_meridians() -> None:
 
 @pytest.mark.parametrize(("latitude", "heading"), [(math.nan, 0.0), (1.7, 0.0), (0.5, math.inf)])
 def test_bad_places_are_refused(latitude: float, heading: float) -> None:
-    with pytest.raises(ValueError, match="finite|beyond the poles"):
+    with pytest.raises(ValueError, match=r"finite|beyond the poles"):
         RunwayFrame(latitude, 0.0, 0.0, heading)
 
 
 def test_ned_axes() -> None:
     R_NE = ned_from_ecef(0.0, 0.0)  # off Africa: north is z, east is y, down is -x
-    assert R_NE @ [0.0, 0.0, 1.0] == pytest.approx([1.0, 0.0, 0.0])
-    assert R_NE @ [0.0, 1.0, 0.0] == pytest.approx([0.0, 1.0, 0.0])
-    assert R_NE @ [-1.0, 0.0, 0.0] == pytest.approx([0.0, 0.0, 1.0])
+    np.testing.assert_allclose(R_NE, [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]], atol=1e-15)

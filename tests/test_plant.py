@@ -28,6 +28,11 @@ def plant(initial: InitialState = APPROACH, **more: object) -> JsbsimPlant:
     return JsbsimPlant(DO128, FRAME, initial, **more)  # type: ignore[arg-type]
 
 
+def fly(p: JsbsimPlant, steps: int) -> None:
+    for _ in range(steps):
+        p.step(p.trimmed, STILL)
+
+
 # ---------------------------------------------------------------------------------------------- beginning
 
 
@@ -81,7 +86,7 @@ def test_position_is_the_integral_of_velocity_in_R() -> None:
 
 
 def test_same_bits_in_fresh_instances_and_after_reset() -> None:
-    def fly(p: JsbsimPlant) -> bytes:
+    def bits(p: JsbsimPlant) -> bytes:
         rng = np.random.default_rng(7)
         for i in range(400):
             p.step(Command(0.01 * math.sin(i / 20), 0.02, -0.01, 0.4, 0.5), rng.normal(size=3))
@@ -89,10 +94,10 @@ def test_same_bits_in_fresh_instances_and_after_reset() -> None:
         return np.concatenate([t.p_RB, t.v_RB_R, t.w_RB_B, t.euler, t.surfaces, [t.thrust, t.airspeed]]).tobytes()
 
     p = plant()
-    first = fly(p)
-    assert fly(plant()) == first
+    first = bits(p)
+    assert bits(plant()) == first
     p.reset()
-    assert fly(p) == first
+    assert bits(p) == first
 
 
 def test_mass_and_cg_disperse_but_positions_stay_those_of_the_nominal_cg() -> None:
@@ -111,7 +116,7 @@ def test_platform_rides_on_the_body() -> None:
     p = plant(platform=PanTilt(pan=0.1, tilt=-0.05), p_BC=np.array([3.0, 0.0, -0.3]))
     truth, camera = p.truth(), p.camera()
     assert camera.p_RC == pytest.approx(truth.p_RB + truth.R_RB @ [3.0, 0.0, -0.3])
-    assert camera.R_CR == pytest.approx(so3.camera_from_body(0.1, -0.05) @ truth.R_RB.T)
+    np.testing.assert_allclose(camera.R_CR, so3.camera_from_body(0.1, -0.05) @ truth.R_RB.T, atol=1e-12)
     for _ in range(200):
         p.step(Command(p.trimmed.elevator, throttle=p.trimmed.throttle, flap=0.5, pan=0.2, tilt=0.0), STILL)
     assert (p.camera().pan, p.camera().tilt) == pytest.approx((0.2, 0.0), abs=2e-3)
@@ -264,7 +269,7 @@ def test_malformed_model(tmp_path: Path) -> None:
 
 
 def test_model_without_an_engine_file(tmp_path: Path) -> None:
-    with pytest.raises(PlantError, match="cannot load|no property"):
+    with pytest.raises(PlantError, match=r"cannot load|no property"):
         FlightModel(broken(tmp_path, 'engine file="do128_turboprop"', 'engine file="nowhere"'), 0.005)
 
 
@@ -306,9 +311,8 @@ def test_mass_below_empty() -> None:
 
 def test_numbers_that_are_not() -> None:
     p = plant()
-    with pytest.raises(PlantError, match="not finite"):
-        for _ in range(3):
-            p.step(p.trimmed, np.array([math.nan, 0.0, 0.0]))
+    with pytest.raises(PlantError, match="state is not finite"):
+        p.step(p.trimmed, np.array([math.nan, 0.0, 0.0]))
     p = plant()
     with pytest.raises(PlantError, match="command is not finite"):
         p.step(Command(elevator=math.nan), STILL)
@@ -345,8 +349,7 @@ def test_beginning_under_ground() -> None:
 def test_leaving_the_tangent_plane() -> None:
     p = plant(InitialState(x=-49_400.0, height=500.0, psi=math.pi))
     with pytest.raises(PlantError, match="neighbourhood"):
-        for _ in range(800):
-            p.step(p.trimmed, STILL)
+        fly(p, 800)
 
 
 def test_camera_without_platform() -> None:

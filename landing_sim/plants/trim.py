@@ -42,7 +42,7 @@ class TrimPoint:
 
 @dataclass(frozen=True, slots=True)
 class LinearModel:
-    """dx/dt = A x + B u + G w about a trim; x STATES, u INPUTS, w (3,) [m/s] velocity of the air along body axes.
+    """dx/dt = A x + B u + G w + G_dot dw/dt about a trim: x STATES, u INPUTS, w (3,) [m/s] the air's velocity, body axes.
 
     u v w [m/s] inertial velocity, p q r [rad/s], phi theta psi [rad], x y H [m] in R with psi = 0 along x.
     """
@@ -50,17 +50,20 @@ class LinearModel:
     A: Array  # (12, 12)
     B: Array  # (12, 4)
     G: Array  # (12, 3)
+    G_dot: Array  # (12, 3)
     states: tuple[str, ...]
     inputs: tuple[str, ...]
 
 
 def trim(
     folder: Path, airspeed: float, gamma: float, flap: float, mass: float | None = None, height: float = 50.0,
-    cg_offset_B: Array | None = None, clearance: float = math.inf, place: tuple[float, float] = PLACE, model: FlightModel | None = None,
+    cg_offset_B: Array | None = None, clearance: float = math.inf, place: tuple[float, float] = PLACE,
+    model: FlightModel | None = None,
 ) -> TrimPoint:  # fmt: skip
     """Find alpha, elevator and throttle for steady flight `height` [m] above sea level, `clearance` [m] above ground.
 
-    Infinitely far from it there is no ground effect. `model` saves loading one. Raises PlantError, with what is missing, where there is no such flight.
+    Infinitely far from it there is no ground effect. `model` saves loading one. Raises PlantError, with what was
+    reached, where there is no such flight.
     """
     m = FlightModel(folder, 0.005, mass, cg_offset_B) if model is None else model
 
@@ -105,7 +108,8 @@ def linearise(folder: Path, point: TrimPoint, model: FlightModel | None = None) 
 
     Thrust [N] is the input and held: its fall with speed is not in A (subtract B_thrust dT/du to add it back).
     The tail feels downwash tau = 0.145 s late, eps(t - tau) ~ eps - tau deps/dt; with dalpha/dt from dw/dt and du/dt this
-    is x' = A0 x + D c x', so A = (I - D c)^-1 A0, the same for B and G. Wind enters forces only, as -A[:6, u v w] of A0.
+    is x' = A0 x + D c x', so A = (I - D c)^-1 A0, the same for B and G. Wind enters forces only, as -A0[:6, u v w], and
+    dalpha/dt by its own rate: G_dot = -(I - D c)^-1 D c[u v w].
     Position and heading do not act on the forces, but height does (density).
     """
     m = FlightModel(folder, 0.005, point.mass) if model is None else model
@@ -158,7 +162,7 @@ def linearise(folder: Path, point: TrimPoint, model: FlightModel | None = None) 
     c = np.zeros((1, 12))
     c[0, 0], c[0, 2] = -math.sin(alpha) / V, math.cos(alpha) / V
     lag = np.linalg.inv(np.eye(12) - D @ c)
-    return LinearModel(lag @ A, lag @ B, lag @ G, STATES, INPUTS)
+    return LinearModel(lag @ A, lag @ B, lag @ G, -lag @ D @ c[:, :3], STATES, INPUTS)
 
 
 def _kinematics(A: Array, x0: Array) -> None:
