@@ -292,31 +292,30 @@ def stream_of(key: np.uint64, index: int) -> np.uint64:
 
 @kernel
 def _develop(
-    out: np.ndarray, row: Array, u0: int, v: int, stream: np.uint64, lens: Array, quantiles: np.ndarray, noise: Array
-) -> None:
-    """Lens gain and offset, sensor noise and quantisation of one row; lens (3,): gain, offset, noise sigma.
+    out: np.ndarray, r0: int, c0: int, block: Array, w: int, h: int, u0: int, v0: int, stream: np.uint64, lens: Array,
+    quantiles: np.ndarray, noise: Array,
+) -> None:  # fmt: skip
+    """Lens gain and offset, sensor noise and quantisation of a block; lens (3,): gain, offset, noise sigma.
 
     The noise of pixel (u, v) is 16 bits of the hash of its counter (four pixels share one hash), through a table of
     Gaussian quantiles. noise (>= w + 6,) is working space.
     """
     gain, offset, sigma = lens[0], lens[1], lens[2]
-    w = out.shape[0]
     skip = u0 & 3
-    if sigma > 0.0:
-        groups = (skip + w + 3) >> 2
-        counter = stream + np.uint64((v << 20) + (u0 >> 2) + 1) * np.uint64(0x9E3779B97F4A7C15)
-        for g in range(groups):
-            bits = mix(counter)
-            counter += np.uint64(0x9E3779B97F4A7C15)
-            for lane in range(4):
-                noise[4 * g + lane] = sigma * quantiles[(bits >> np.uint64(16 * lane)) & np.uint64(0xFFFF)]
-    else:
-        noise[: w + 6] = 0.0
-    drawn = noise[skip : skip + w]
-    for c in range(w):
-        value = row[c] * gain + offset + drawn[c] + 0.5
-        value = value if value > 0.0 else 0.0
-        out[c] = np.uint8(value if value < 255.0 else 255.0)
+    for c in range(w + 6):
+        noise[c] = 0.0
+    for r in range(h):
+        if sigma > 0.0:
+            counter = stream + np.uint64(((v0 + r) << 20) + (u0 >> 2) + 1) * np.uint64(0x9E3779B97F4A7C15)
+            for g in range((skip + w + 3) >> 2):
+                bits = mix(counter)
+                counter += np.uint64(0x9E3779B97F4A7C15)
+                for lane in range(4):
+                    noise[4 * g + lane] = sigma * quantiles[(bits >> np.uint64(16 * lane)) & np.uint64(0xFFFF)]
+        for c in range(w):
+            value = block[r, c] * gain + offset + noise[skip + c] + 0.5
+            value = value if value > 0.0 else 0.0
+            out[r0 + r, c0 + c] = np.uint8(value if value < 255.0 else 255.0)
 
 
 @kernel
@@ -373,8 +372,7 @@ def shade(
                     for c in range(bw):
                         total[r, c] = block[r, c] / subs + (total[r, c] if k else 0.0)
         drawn = total if subs > 1 else block
-        for r in range(bh):
-            _develop(out[r0 + r, c0 : c0 + bw], drawn[r], u0, v0 + r, stream, lens, quantiles, noise)
+        _develop(out, r0, c0, drawn, bw, bh, u0, v0, stream, lens, quantiles, noise)
     return True
 
 
@@ -383,8 +381,5 @@ def develop_frame(image: Array, lens: Array, quantiles: np.ndarray, key: np.uint
     """(height, width) uint8 of an image drawn elsewhere: lens, noise and quantisation as in all frames."""
     height, width = image.shape
     out = np.empty((height, width), np.uint8)
-    noise = np.empty(width + 6)
-    stream = stream_of(key, index)
-    for v in range(height):
-        _develop(out[v], image[v], 0, v, stream, lens, quantiles, noise)
+    _develop(out, 0, 0, image, width, height, 0, 0, stream_of(key, index), lens, quantiles, np.empty(width + 6))
     return out
