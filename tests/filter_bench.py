@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from landing_sim.estimators import states
-from landing_sim.estimators.aircraft_model import AircraftBelief, downwash, propagate, thrust
+from landing_sim.estimators.aircraft_model import downwash, propagate, thrust
+from landing_sim.estimators.belief import AircraftBelief
 from landing_sim.estimators.edge_model import edge_model
 from landing_sim.estimators.runway_ekf import FilterConfig, RunwayEkf
 from landing_sim.geometry.pinhole import Intrinsics
@@ -31,9 +32,7 @@ def truth_at(rng: np.random.Generator, x_m: float = -900.0, wind: tuple[float, f
 
 def settle(x: np.ndarray, par: np.ndarray) -> np.ndarray:
     alpha = np.arctan2(x[2], x[0])
-    return np.array(
-        [COMMAND.elevator, 0, 0, 0.5, thrust(COMMAND.throttle, 50.0, par), downwash(alpha, 0.5, x[11], par)]
-    )
+    return np.array([COMMAND.elevator, 0, 0, 0.5, thrust(COMMAND.throttle, 50.0, par), downwash(x, alpha, 0.5, par)])
 
 
 def fly(x: np.ndarray, s: np.ndarray, par: np.ndarray, q: np.ndarray, dt: float, rng: np.random.Generator) -> None:

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from landing_sim.estimators import kalman, states
-from landing_sim.estimators.aircraft_model import AircraftBelief, dynamics, propagate
+from landing_sim.estimators.aircraft_model import dynamics, parameters, propagate
+from landing_sim.estimators.belief import AircraftBelief
 from landing_sim.estimators.edge_model import edge_model
 from landing_sim.estimators.inertial_model import airspeed_model, gyro_model
 from landing_sim.estimators.rewind import Rewind
@@ -19,7 +20,7 @@ from landing_sim.geometry.runway_image import image_line, plane_normal
 from landing_sim.geometry.so3 import camera_from_body, from_euler
 from landing_sim.signals import Status
 
-PAR = AircraftBelief().vector()
+PAR = parameters(AircraftBelief(), 0.01)
 SHADOW = np.array([0.02, 0.01, -0.03, 0.5, 4000.0, 0.05])
 
 
@@ -58,7 +59,7 @@ def test_dynamics_jacobian_against_differences(seed: int) -> None:
 
 def test_steady_level_flight_by_hand() -> None:
     """With no aerodynamics, no thrust and no rotation the aircraft falls with g, and positions follow the velocity."""
-    nothing = AircraftBelief(S=0.0).vector()
+    nothing = parameters(AircraftBelief(S=0.0), 0.0)
     x = np.zeros(states.N)
     x[0], x[states.THETA], x[states.H] = 50.0, 0.1, 30.0
     f = np.empty(12)
@@ -85,7 +86,7 @@ def test_transition_matrix_is_the_exponential() -> None:
 
 def test_integration_converges_with_fourth_order() -> None:
     """Halving the step of propagate, shadow frozen by its own steady state, cuts the error 16-fold."""
-    frozen = AircraftBelief(tau_surface=1e9, tau_engine=1e9, tau_downwash=1e9).vector()
+    frozen = parameters(AircraftBelief(tau_surface=1e9, tau_engine=1e9, tau_downwash=1e9), 0.0)
     Phi = np.empty((15, 15))
 
     def end(n: int) -> np.ndarray:
@@ -309,7 +310,7 @@ def test_watchdog_reopens_a_locked_out_filter() -> None:
     par, x = ekf._par, truth[-1].copy()
     s = bench.settle(x, par)
     reinflated = False
-    for k in range(60):
+    for _ in range(60):
         t = memory.t + 0.06
         bench.fly(x, s, par, np.zeros(states.N), 0.06, rng)
         memory = ekf.predict(memory, bench.COMMAND, t)

@@ -26,34 +26,44 @@ from landing_sim.types import Array
 _NAMES = tuple(f.name for f in fields(AircraftBelief))
 (
     _MASS, _IXX, _IYY, _IZZ, _IXZ, _S, _B, _C, _RHO, _G, _CLA, _A0, _CLF, _EPSA, _EPSF, _CLT, _IT, _LT, _XAC,
-    _CD0, _CDF, _K, _CM0, _CMF, _CMQ, _ZT, _CYB, _CYDR, _CYP, _CYR, _CLB, _CLDA, _CLDR, _CLP, _CLR0, _CLRL,
+    _CD0, _CDF, _KV, _KI, _CM0, _CMF, _CMQ, _ZT, _CYB, _CYDR, _CYP, _CYR, _CLB, _CLDA, _CLDR, _CLP, _CLR0, _CLRL,
     _CNB, _CNDR, _CNDAL, _CNP0, _CNPL, _CNR, _TAU_EPS, _TAU_S, _TAU_E, _T0, _TV, _TVV, _TIDLE, _HW,
+    _GL, _GD,
 ) = range(len(_NAMES))  # fmt: skip
 
 
-@kernel
-def ground_factor(H: float, par: Array) -> tuple[float, float]:
-    """Share of the induced drag (and downwash) left at height H of the cg, and its derivative.
+_SLOPE = len(_NAMES)  # tangent of the runway's slope, after the aircraft's own parameters
 
-        G = s / (1 + s),  s = (16 h / b)^2
+
+def parameters(belief: AircraftBelief, slope: float) -> Array:
+    """What the kernels are told: the aircraft, and the slope [rad] of the ground below it."""
+    return np.append(belief.vector(), math.tan(slope))
+
+
+@kernel
+def over_ground(x: Array, par: Array) -> tuple[float, float]:
+    """Height [m] of the wing above the surface and its derivative with respect to H (zero where it is held)."""
+    h = x[11] - par[_SLOPE] * x[9] + par[_HW]
+    return (h, 1.0) if h > 1.0 else (1.0, 0.0)
+
+
+@kernel
+def induced_share(h: float, par: Array) -> tuple[float, float]:
+    """Share of the induced drag left at height h of the wing, and its derivative: s / (1 + s), s = (16 h / b)^2.
 
     Source     McCormick 1979, eq. (7.6).
     """
-    h = H + par[_HW]
-    if h < 0.3:
-        h = 0.3
-        dh = 0.0
-    else:
-        dh = 1.0
     k = 16.0 / par[_B]
     s = (k * h) ** 2
-    return s / (1.0 + s), dh * 2.0 * k * k * h / (1.0 + s) ** 2
+    return s / (1.0 + s), 2.0 * k * k * h / (1.0 + s) ** 2
 
 
 @kernel
-def downwash(alpha: float, flap: float, H: float, par: Array) -> float:
-    """Downwash angle at the tail [rad] once the flow has settled."""
-    return par[_EPSA] * (alpha + par[_A0] + par[_EPSF] * flap) * ground_factor(H, par)[0]
+def downwash(x: Array, alpha: float, flap: float, par: Array) -> float:
+    """Downwash angle at the tail [rad] once the flow has settled; the ground takes its share."""
+    h2 = over_ground(x, par)[0] ** 2
+    share = h2 / (h2 + par[_GD] ** 2)
+    return par[_EPSA] * (alpha + par[_A0] + par[_EPSF] * flap) * share
 
 
 @kernel
@@ -61,7 +71,7 @@ def dynamics(x: Array, s: Array, par: Array, f: Array, A: Array, jacobian: bool)
     """Fill f (12,) = x' and, if asked, A (12, 15) = df/d(12 states, 3 wind components).
 
     x (>= 15,) state, layout of `states`; s (6,) shadow: elevator, aileron, rudder [rad], flap, thrust [N], downwash [rad];
-    par: AircraftBelief.vector().
+    par: see `parameters`.
     """
     u, v, w, p, q, r = x[0], x[1], x[2], x[3], x[4], x[5]
     phi, theta, psi = x[6], x[7], x[8]
@@ -81,12 +91,18 @@ def dynamics(x: Array, s: Array, par: Array, f: Array, A: Array, jacobian: bool)
     ca, sa = math.cos(alpha), math.sin(alpha)
     qS = 0.5 * par[_RHO] * V2 * par[_S]
     b2V, c2V = par[_B] / (2.0 * V), par[_C] / (2.0 * V)
-    G, dG = ground_factor(x[11], par)
+    wing, dwing = over_ground(x, par)
+    G, dG = induced_share(wing, par)
+    dG *= dwing
+    lift = 1.0 / (1.0 - par[_GL] * (1.0 - G))
+    dlift = -par[_GL] * lift * lift * dG
 
-    CLw = par[_CLA] * (alpha + par[_A0]) + par[_CLF] * flap
+    CLw0 = par[_CLA] * (alpha + par[_A0]) + par[_CLF] * flap
+    CLw = lift * CLw0
     CLt = par[_CLT] * (alpha - eps + par[_IT] + q * par[_LT] / V + de)
     CL = CLw + CLt
-    CD = par[_CD0] + par[_CDF] * flap + par[_K] * G * CLw * CLw
+    k = par[_KV] + par[_KI] * G
+    CD = par[_CD0] + par[_CDF] * flap + k * CLw * CLw
     CX = CL * sa - CD * ca
     CZ = -CL * ca - CD * sa
     CY = par[_CYB] * beta + par[_CYDR] * dr + b2V * (par[_CYP] * p + par[_CYR] * r)
@@ -136,9 +152,9 @@ def dynamics(x: Array, s: Array, par: Array, f: Array, A: Array, jacobian: bool)
         dp = 1.0 if i == 3 else 0.0
         dq = 1.0 if i == 4 else 0.0
         dr_ = 1.0 if i == 5 else 0.0
-        dCLw = par[_CLA] * dal
+        dCLw = lift * par[_CLA] * dal + (dlift * CLw0 if i == 6 else 0.0)
         dCLt = par[_CLT] * (dal + par[_LT] / V * (dq - q * dV_V))
-        dCD = par[_K] * (2.0 * G * CLw * dCLw + (dG * CLw * CLw if i == 6 else 0.0))
+        dCD = 2.0 * k * CLw * dCLw + (par[_KI] * dG * CLw * CLw if i == 6 else 0.0)
         dCL = dCLw + dCLt
         dCX = dCL * sa - dCD * ca + (CL * ca + CD * sa) * dal
         dCZ = -dCL * ca - dCD * sa + (CL * sa - CD * ca) * dal
@@ -171,6 +187,7 @@ def dynamics(x: Array, s: Array, par: Array, f: Array, A: Array, jacobian: bool)
             A[i, 6 + j] = (d[i, 0] * (ey * wbz - ez * wby) + d[i, 1] * (ez * wbx - ex * wbz)
                            + d[i, 2] * (ex * wby - ey * wbx))  # fmt: skip
         A[i, 11] = d[i, 6]
+        A[i, 9] = -par[_SLOPE] * d[i, 6]
     # gravity and transport
     A[0, 7] += -g * cth
     A[1, 6] += g * cth * cph
@@ -244,7 +261,7 @@ def propagate(x: Array, s: Array, u: Array, par: Array, on_ground: bool, dt: flo
     s[3] = u[4]
     T = thrust(u[3], V, par)
     s[4] = T + (s0[4] - T) * a_e
-    eps = downwash(math.atan2(x[2], x[0]), s0[3], x[11], par)
+    eps = downwash(x, math.atan2(x[2], x[0]), s0[3], par)
     s[5] = eps + (s0[5] - eps) * a_d
     mid = 0.5 * (s0 + s)
 

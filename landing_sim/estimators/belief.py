@@ -42,7 +42,8 @@ class AircraftBelief:
     x_ac: float = 0.228  # wing-body aerodynamic centre ahead of the cg
     CD_0: float = 0.040
     CD_flap: float = 0.090
-    k_induced: float = 0.0509
+    k_viscous: float = 0.0127  # drag due to lift that the ground does not change
+    k_induced: float = 0.0382  # that it does
     Cm_0: float = -0.03
     Cm_flap: float = -0.10
     Cm_q: float = -3.0  # wing-body alone
@@ -70,7 +71,9 @@ class AircraftBelief:
     T_V: float = -0.0113  # T = T_0 throttle (1 + T_V V + T_VV V^2)
     T_VV: float = 4.4e-5
     T_idle: float = 0.0  # share of full thrust at throttle 0
-    h_wing: float = 0.0  # height of the wing above the cg, for ground effect
+    h_wing: float = 0.0  # [m] height of the wing above the cg
+    ground_lift: float = 0.183  # wing lift is divided by 1 - this (1 - G), G the share of induced drag left
+    ground_downwash: float = 3.11  # [m] height at which half of the downwash is left
 
     def vector(self) -> Array:
         """All parameters as one array, in the order of the fields, for the kernels."""

@@ -17,7 +17,8 @@ from typing import Literal
 import numpy as np
 
 from landing_sim.estimators import kalman, states
-from landing_sim.estimators.aircraft_model import AircraftBelief, downwash, propagate, thrust
+from landing_sim.estimators.aircraft_model import downwash, parameters, propagate, thrust
+from landing_sim.estimators.belief import AircraftBelief
 from landing_sim.estimators.edge_model import edge_model
 from landing_sim.estimators.inertial_model import airspeed_model, gyro_model
 from landing_sim.geometry.pinhole import Intrinsics
@@ -124,7 +125,7 @@ class RunwayEkf:
         self.config = config
         self.blocks = Blocks.of(config)
         self.names = tuple(states.NAMES[i] for i in self.blocks.index)
-        self._par = belief.vector()
+        self._par = parameters(belief, slope)
         self._focal = np.array([camera.f, camera.cx, camera.cy])
         self._lever = np.asarray(lever, dtype=float)
         self._width, self._slope = width, slope
@@ -254,7 +255,7 @@ class RunwayEkf:
         if not memory.valid:
             alpha = math.atan2(x[states.W], x[states.U])
             shadow = shadow.copy()
-            shadow[5] = downwash(alpha, shadow[3], x[states.H], self._par)
+            shadow[5] = downwash(x, alpha, shadow[3], self._par)
         start = replace(memory, valid=True, x=x, shadow=shadow, frames=0, misses=0, rejected=0.0)
         if c.factorisation == "ud":
             U, D = kalman.ud_factor(P)
