@@ -292,7 +292,7 @@ def _front_ends(scenario: Scenario, camera: BelievedCamera, noise: Noise) -> dic
             if wanted.mapped
         ),
     )
-    front_end = RunwayFrontEnd(known, camera, FrontEndConfig(v.windows, v.platform_angle), noise)
+    front_end = RunwayFrontEnd(known, camera, FrontEndConfig(v.windows, v.platform_angle))
     return {
         "camera": front_end,
         "gyro": Reading("gyro", "gyro", math.radians(max(s.gyro.noise_dps, 0.01))),
