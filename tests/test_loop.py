@@ -156,3 +156,8 @@ def test_periods_must_be_whole_numbers_of_steps() -> None:
     assert whole_steps(0.06, 0.005) == 12
     with pytest.raises(ValueError, match="not a whole number"):
         whole_steps(0.033, 0.005)
+
+
+def test_a_sensor_faster_than_or_beside_the_cycle_is_refused() -> None:
+    with pytest.raises(ValueError, match="whole number of cycles"):
+        fly(12, 2, Eye("eye", 0.1, 0.0))

@@ -35,12 +35,10 @@ from landing_sim.signals import Feature, Step, Touchdown
 from landing_sim.vehicle import Vehicle
 from landing_sim.vision.believed import BelievedCamera, RunwayMap, TaxiwayMouth
 from landing_sim.vision.front_end import FrontEndConfig, RunwayFrontEnd
-from landing_sim.world.dryden import Turbulence
+from landing_sim.world.dryden import W20, Turbulence
 from landing_sim.world.runway import Greys, Runway, Taxiway
 from landing_sim.world.wind import CrosswindStep, ExponentialGust, SteadyWind, Wind, WindConfig
 
-KNOT = 1852.0 / 3600.0
-W20 = {"light": 15.0 * KNOT, "moderate": 30.0 * KNOT, "severe": 45.0 * KNOT}
 STOPPED = 0.5  # [m/s] over the ground
 GO_AROUND_ENDS = 300.0  # [m] beyond the threshold
 CRASH_SINK = 5.0  # [m/s]
@@ -138,7 +136,7 @@ def build(scenario: Scenario, vehicle: Vehicle, seed: int, run: int = 0) -> Miss
     clock = loop.Clock.of(scenario.time.step_s, scenario.time.cycle_s, scenario.control.delay_s)
     wind = _wind(scenario, noise("turbulence"))
     platform = _platform(scenario)
-    plant = _plant(scenario, vehicle, platform)
+    plant = _plant(scenario, vehicle, platform, wind)
     sensors = _sensors(scenario, plant, platform, noise)
     camera = _believed_camera(scenario, vehicle)
     settings = _control_settings(scenario, vehicle)
@@ -203,7 +201,7 @@ def _platform(scenario: Scenario) -> PanTilt:
     )
 
 
-def _plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt) -> JsbsimPlant:
+def _plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt, wind: Wind) -> JsbsimPlant:
     a, s, r = scenario.aircraft, scenario.initial, scenario.runway
     frame = RunwayFrame(
         math.radians(r.latitude_deg), math.radians(r.longitude_deg), r.elevation_m, math.radians(r.heading_deg)
@@ -219,16 +217,13 @@ def _plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt) -> JsbsimPla
         mass=a.mass_kg,
         cg_offset_B=(a.cg_offset_m, 0.0, 0.0),
     )
-    steady = np.array([-scenario.wind.headwind_mps, 0.0, 0.0])
-    if scenario.wind.crosswind_from_x_m is None:
-        steady[1] = scenario.wind.crosswind_mps
     return JsbsimPlant(
         paths.aircraft_folder(a.model),
         frame,
         initial,
         math.atan(r.slope_percent / 100.0),
         scenario.time.step_s,
-        steady,
+        wind.wind(0.0, s.x_m, s.height_m, s.airspeed_mps),
         platform,
         np.array(vehicle.camera.p_BC_m),
     )
