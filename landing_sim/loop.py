@@ -67,7 +67,8 @@ def simulate(
 ) -> Iterator[Step]:
     """Fly; yields one Step a control cycle, for ever: whoever listens decides when it is over.
 
-    `sensors` are read in the order given; ValueError if a period is not a whole number of control cycles. `front_ends` maps a sensor's name to what turns its samples into measurements.
+    `sensors` are read in the order given; ValueError if a period is not a whole number of control cycles. `front_ends`
+    maps a sensor's name to what turns its samples into measurements.
     `trim` acts until the first command does. Nothing but samples crosses from the truth to the onboard side.
     """
     periods = [whole_steps(sensor.period, clock.dt) for sensor in sensors]
