@@ -1,0 +1,274 @@
+"""Guidance: geometry by hand, continuity, phases and the decision to go around; where the camera points."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from landing_sim.control.guidance import Capture, GuidanceMemory, LandingGuidance, Path
+from landing_sim.control.pointing import look_along
+from landing_sim.control.settings import (
+    CaptureSettings,
+    DecrabSettings,
+    GearSettings,
+    GoAroundSettings,
+    GuidanceSettings,
+    PathSettings,
+)
+from landing_sim.geometry import so3
+from landing_sim.signals import Estimate, Reference
+
+SETTINGS = GuidanceSettings(
+    gear=GearSettings(forward_m=0.6, side_m=1.76, down_m=1.8),
+    path=PathSettings(
+        glide_deg=2.7, flare_height_m=17.0, sink_height_m=3.0, touchdown_x_m=550.0, approach_mps=50.0,
+        touchdown_mps=43.0, height_error_limit_m=2.5,
+    ),
+    capture=CaptureSettings(
+        bank_deg=7.5, bank_limit_deg=9.0, intercept_limit_deg=30.0, join_m=5.5, end_m=2.0, heading_error_limit_deg=4.0
+    ),
+    decrab=DecrabSettings(start_height_m=2.0, end_height_m=0.5, wind_filter_s=1.5),
+    go_around=GoAroundSettings(
+        decision_height_m=10.0, stable_by_m=20.0, max_y_m=10.0, max_height_error_m=5.0, max_speed_error_mps=6.0,
+        unstable_s=1.0, blackout_s=3.0, climb_deg=4.0,
+    ),
+    touchdown_height_m=0.1,
+    touchdown_confirm_s=0.1,
+)  # fmt: skip
+NAMES = ("u", "v", "w", "p", "q", "r", "phi", "theta", "psi", "x", "y", "H", "wx", "wy", "wz")
+CYCLE = 0.06
+
+
+def estimate(t: float = 0.0, valid: bool = True, flags: dict[str, bool] | None = None, **values: float) -> Estimate:
+    state = {"u": 50.0, "x": -600.0, "H": 35.0, **values}
+    mean = np.array([state.get(name, 0.0) for name in NAMES])
+    return Estimate(t, NAMES, mean, None, valid, flags or {})
+
+
+def on_path(guidance: LandingGuidance, t: float, x: float, **values: float) -> Estimate:
+    """Wheels on the path, level attitude: the cg is 1.8 m above them and 0.6 m behind."""
+    height, _, _ = guidance.path.height(x + 0.6)
+    return estimate(t, x=x, H=height + 1.8, **{"u": guidance.path.speed(x + 0.6)[0], **values})
+
+
+def fly(guidance: LandingGuidance, memory: GuidanceMemory, *estimates: Estimate) -> tuple[GuidanceMemory, Reference]:
+    for e in estimates:
+        memory, reference = guidance.step(memory, e)
+    return memory, reference
+
+
+# --------------------------------------------------------------------------------------------------- geometry
+
+
+def test_path_by_hand() -> None:
+    """tan 2.7 deg = 0.047159; L = 20 / 0.047159 = 424.1 m; the exponential falls from 20 to 3 m in L ln(20/3) = 804.6 m."""
+    path = Path.from_settings(SETTINGS.path)
+    assert path.length == pytest.approx(424.10, abs=0.01)
+    assert path.flare_x == pytest.approx(550.0 - 804.57, abs=0.02)
+    assert path.height(path.flare_x)[0] == pytest.approx(17.0)
+    assert path.height(550.0) == pytest.approx((0.0, -3.0 / 424.10, 3.0 / 424.10**2), abs=1e-6)
+    assert path.height(path.flare_x - 100.0)[0] == pytest.approx(17.0 + 4.7159, abs=1e-3)
+    assert path.height(700.0)[0] < 0.0
+
+
+def test_path_and_speed_are_continuous_with_the_derivatives_they_claim() -> None:
+    path = Path.from_settings(SETTINGS.path)
+    h = 1e-3
+    for x in (path.flare_x, path.touchdown_x):
+        below, above = path.height(x - 1e-9), path.height(x + 1e-9)
+        assert below[:2] == pytest.approx(above[:2], abs=1e-8)
+        assert path.speed(x - 1e-9)[0] == pytest.approx(path.speed(x + 1e-9)[0], abs=1e-8)
+    for x in (-700.0, -100.0, 200.0, 500.0):
+        (a, sa, _), (_, s, c), (b, sb, _) = path.height(x - h), path.height(x), path.height(x + h)
+        assert (b - a) / (2 * h) == pytest.approx(s, abs=1e-8)
+        assert (sb - sa) / (2 * h) == pytest.approx(c, abs=1e-8)
+        assert (path.speed(x + h)[0] - path.speed(x - h)[0]) / (2 * h) == pytest.approx(path.speed(x)[1], abs=1e-8)
+    assert path.speed(-400.0) == (50.0, 0.0)
+    assert path.speed(600.0) == (43.0, 0.0)
+    V, slope = path.speed(100.0)
+    assert V * slope == pytest.approx((43.0**2 - 50.0**2) / (2 * (550.0 - path.flare_x)))  # constant deceleration
+
+
+def test_capture_by_hand() -> None:
+    """7.5 deg at 50 m/s turns on 50² / (9.80665 tan 7.5°) = 1936.4 m; from 85 m: sqrt((170 - 5.5) / 1936.4) = 16.70°."""
+    guidance = LandingGuidance(SETTINGS)
+    assert guidance.capture.radius == pytest.approx(1936.4, abs=0.1)
+    assert math.degrees(guidance.capture.course(-85.0)[0]) == pytest.approx(16.70, abs=0.01)
+    assert math.degrees(guidance.capture.course(85.0)[0]) == pytest.approx(-16.70, abs=0.01)
+    assert guidance.capture.course(0.0)[0] == 0.0
+    assert math.degrees(guidance.capture.course(-400.0)[0]) == pytest.approx(30.0)  # never steeper than that
+
+
+@settings(deadline=None)
+@given(st.floats(-300.0, 300.0))
+def test_capture_is_smooth_and_its_turn_has_one_radius(y: float) -> None:
+    capture = Capture(join=5.5, radius=1936.4, limit=math.radians(30.0))
+    (a, _), (course, slope), (b, _) = capture.course(y - 1e-4), capture.course(y), capture.course(y + 1e-4)
+    kink = min(abs(abs(y) - 5.5), abs(abs(y) - 0.5 * (5.5 + 1936.4 * capture.limit**2)))
+    if kink > 1e-3:
+        assert (b - a) / 2e-4 == pytest.approx(slope, abs=1e-7)
+    assert abs(b - a) < 2e-4 * 0.0098  # no step, also at the join: the steepest slope is 1 / sqrt(join radius)
+    if 5.5 < abs(y) < 260.0:
+        assert abs(slope * course) == pytest.approx(1.0 / 1936.4)  # d course / ds = slope sin(course) ~ slope course
+
+
+def test_flying_the_capture_law_turns_at_the_bank_asked_for() -> None:
+    """Integrated exactly as the law says, the 85 m are gone at the distance the arc needs, without overshoot."""
+    guidance = LandingGuidance(SETTINGS)
+    x, y, banks = 0.0, -85.0, []
+    for i in range(2000):
+        course, _ = guidance.capture.course(y)
+        e = estimate(i * 0.01, u=50.0 * math.cos(course), v=50.0 * math.sin(course), x=-950.0 + x, y=y)
+        reference = guidance.step(GuidanceMemory("capture"), e)[1]
+        if abs(y) > 6.0:
+            banks.append(math.degrees(reference.phi))
+        x, y = x + 0.5 * math.cos(course), y + 0.5 * math.sin(course)
+        if abs(y) < 5.0:
+            break
+    assert np.allclose(banks, -7.5, atol=0.15)  # a left turn; small angles make the difference
+    # arc of 1936.4 m from 16.70° to 3.05°, then from 5.5 to 5 m: 461 + 0.1 sqrt(5.5 1936.4) = 471 m
+    assert x == pytest.approx(471.0, abs=6.0)
+
+
+# --------------------------------------------------------------------------------------------------- references
+
+
+def test_wind_becomes_crab_then_sideslip() -> None:
+    guidance = LandingGuidance(SETTINGS)
+    _, high = fly(guidance, GuidanceMemory("glide"), on_path(guidance, 0.0, -400.0, wy=-1.0))
+    assert high.psi == pytest.approx(1.0 / 50.0, rel=1e-2)  # nose to the right, into the air that comes from there
+    assert high.extra["sideslip"] == 0.0
+    low = estimate(0.0, x=520.0, H=1.8 + 0.4, u=43.0, wy=-1.0)
+    _, low_reference = fly(guidance, GuidanceMemory("decrab"), low)
+    assert low_reference.psi == 0.0
+    assert low_reference.extra["sideslip"] == pytest.approx(1.0 / 43.0, rel=1e-2)
+
+
+def test_crosswind_is_smoothed() -> None:
+    guidance = LandingGuidance(SETTINGS)
+    memory = GuidanceMemory("glide")
+    memory, _ = guidance.step(memory, on_path(guidance, 0.0, -400.0))
+    for i in range(1, 26):  # 1.5 s
+        memory, _ = guidance.step(memory, on_path(guidance, i * CYCLE, -400.0, wy=2.0))
+    assert memory.crosswind == pytest.approx(2.0 * (1.0 - math.exp(-1.0)), rel=0.03)
+
+
+def test_height_reference_is_the_wheels_path_and_is_approached_at_a_limited_rate() -> None:
+    guidance = LandingGuidance(SETTINGS)
+    e = on_path(guidance, 0.0, -500.0)
+    assert guidance.step(GuidanceMemory("glide"), e)[1].height == pytest.approx(e["H"])
+    high = replace(e, mean=e.mean + np.where(np.array(NAMES) == "H", 20.0, 0.0))
+    reference = guidance.step(GuidanceMemory("glide"), high)[1]
+    assert reference.height == pytest.approx(high["H"] - 2.5)
+    assert reference.extra["on_path"] == 0.0
+    assert reference.climb_rate == pytest.approx(-50.0 * math.tan(math.radians(2.7)))
+
+
+# --------------------------------------------------------------------------------------------------- phases
+
+
+def test_phases_of_an_undisturbed_landing_come_in_order() -> None:
+    guidance = LandingGuidance(SETTINGS)
+    memory, modes = guidance.init(), []
+    y, x, t = -40.0, -950.0, 0.0
+    while x < 1200.0:
+        V = guidance.path.speed(x)[0] if x < 560.0 else max(43.0 - 0.1 * (x - 560.0), 0.4)
+        flags = {"on_ground": x > 555.0}
+        e = replace(on_path(guidance, t, x, y=y, u=V), valid=x > -930.0, flags=flags)
+        memory, reference = guidance.step(memory, e)
+        if not modes or modes[-1] != reference.mode:
+            modes.append(reference.mode)
+        y, x, t = y * 0.985, x + V * CYCLE, t + CYCLE
+        if reference.mode == "stopped":
+            break
+    assert modes == ["acquire", "capture", "glide", "flare", "decrab", "rollout", "stopped"]
+
+
+def test_touchdown_without_a_switch_needs_a_moment() -> None:
+    guidance = LandingGuidance(SETTINGS)
+    low = [estimate(i * CYCLE, x=550.0, H=1.85, u=43.0) for i in range(4)]
+    memory = GuidanceMemory("decrab", t=-CYCLE, seen=0.0)
+    modes = []
+    for e in low:
+        memory, reference = guidance.step(memory, e)
+        modes.append(reference.mode)
+    assert modes == ["decrab", "rollout", "rollout", "rollout"]
+
+
+def test_long_blackout_goes_around_but_not_below_decision_height() -> None:
+    guidance = LandingGuidance(SETTINGS)
+    for x, expected in ((-400.0, "go_around"), (100.0, "flare")):
+        memory = guidance.init()
+        memory, _ = guidance.step(memory, on_path(guidance, 0.0, x))
+        modes = []
+        for i in range(1, 60):
+            memory, reference = guidance.step(memory, replace(on_path(guidance, i * CYCLE, x), valid=False))
+            modes.append(reference.mode)
+        assert "go_around" not in modes[:49]  # 3 s of patience
+        assert modes[-1] == expected
+
+
+def test_unstable_approach_goes_around_and_climbs() -> None:
+    guidance = LandingGuidance(SETTINGS)
+    memory = guidance.init()
+    for i in range(18):
+        memory, reference = guidance.step(memory, on_path(guidance, i * CYCLE, -250.0, y=12.0))
+    assert reference.mode == "go_around"
+    start = memory.start[0]
+    rates = []
+    for i in range(18, 120):
+        memory, reference = guidance.step(memory, on_path(guidance, i * CYCLE, -250.0, y=12.0))
+        rates.append(reference.climb_rate)
+    assert np.all(np.diff(rates) >= -1e-9)
+    assert np.max(np.diff(rates)) < 1.5 * CYCLE + 1e-9  # a gentle pull, no step
+    assert rates[-1] == pytest.approx(50.0 * math.sin(math.radians(4.0)))
+    assert reference.extra["pull"] == 0.0
+    assert start > 1.0
+
+
+def test_a_short_instability_is_flown_through() -> None:
+    guidance = LandingGuidance(SETTINGS)
+    memory = guidance.init()
+    for i in range(60):
+        y = 12.0 if 10 < i < 20 else 0.0
+        memory, reference = guidance.step(memory, on_path(guidance, i * CYCLE, -250.0, y=y))
+        assert reference.mode != "go_around"
+
+
+def test_an_estimate_without_a_state_is_refused() -> None:
+    guidance = LandingGuidance(SETTINGS)
+    names = tuple(n for n in NAMES if n != "psi")
+    with pytest.raises(ValueError, match="needs psi"):
+        guidance.step(GuidanceMemory("glide"), Estimate(0.0, names, np.zeros(len(names)), None, True))
+
+
+def test_wind_need_not_be_estimated() -> None:
+    guidance = LandingGuidance(SETTINGS)
+    e = on_path(guidance, 0.0, -400.0)
+    plain = Estimate(0.0, NAMES[:12], e.mean[:12], None, True)
+    assert guidance.step(GuidanceMemory("glide"), plain)[1] == guidance.step(GuidanceMemory("glide"), e)[1]
+
+
+# --------------------------------------------------------------------------------------------------- pointing
+
+
+@settings(deadline=None)
+@given(
+    phi=st.floats(-0.6, 0.6), theta=st.floats(-0.4, 0.4), psi=st.floats(-1.0, 1.0),
+    azimuth=st.floats(-0.3, 0.3), elevation=st.floats(-0.3, 0.3),
+)  # fmt: skip
+def test_camera_looks_where_it_is_told(phi: float, theta: float, psi: float, azimuth: float, elevation: float) -> None:
+    pan, tilt = look_along(phi, theta, psi, azimuth, elevation)
+    R_RC = so3.from_euler(phi, theta, psi) @ so3.camera_from_body(pan, tilt).T
+    wanted = [math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), -math.sin(elevation)]
+    np.testing.assert_allclose(R_RC[:, 2], wanted, atol=1e-12)
+
+
+def test_pointing_signs() -> None:
+    assert look_along(0.0, 0.0, 0.2) == pytest.approx((-0.2, 0.0))  # nose right of the runway: look left
+    assert look_along(0.0, -0.05, 0.0) == pytest.approx((0.0, 0.05))  # nose down: look up
