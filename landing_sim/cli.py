@@ -67,7 +67,7 @@ def replay(
         if not (path / SCENARIO).is_file():
             raise ConfigError([Problem(Mark(str(path)), (), f"holds no {SCENARIO} to fly again")])
         again = _load(str(path / SCENARIO), set_)
-        path = path.with_name(path.name + "-again")
+        path = path.resolve().with_name(path.resolve().name + "-again")
         _fly(again, again.name, path, as_json=False, live=False, record=True, leave=False)
     recording = path / RECORDING if path.is_dir() else path
     if not recording.is_file():

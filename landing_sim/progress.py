@@ -71,11 +71,12 @@ def _lines() -> Callable[[Step], None]:
 
 def table(result: dict[str, Any]) -> None:
     """The result of a run: touchdown, every criterion beside its limit and source, files."""
+    from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table
 
-    console = Console()
-    rows = Table(title=f"{result['scenario']}, seed {result['seed']}", title_justify="left")
+    console = Console(width=None if sys.stdout.isatty() else 110)
+    rows = Table(title=f"{result['scenario']}, seed {result['seed']}", title_justify="left", box=SIMPLE_HEAD)
     for heading, justify in (("", "left"), ("ours", "right"), ("limit", "right"), ("", "left"), ("source", "left")):
         rows.add_column(heading, justify=justify)  # type: ignore[arg-type]
     for criterion in result["criteria"]:

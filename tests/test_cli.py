@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -168,6 +169,33 @@ def test_out_is_never_taken_from_others(flown: tuple[Path, subprocess.CompletedP
     assert sorted(p.name for p in (folder / "out/gust-3").iterdir()) == [
         "log.parquet", "notes.txt", "result.json", "scenario.json",
     ]  # fmt: skip
+
+
+def test_replay_shows_the_recording_or_flies_again_with_changes(
+    flown: tuple[Path, subprocess.CompletedProcess[str]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    from typer.testing import CliRunner
+
+    from landing_sim.cli import app
+    from landing_sim.record import replay
+
+    shown: list[tuple[Path, bool]] = []
+    monkeypatch.setattr(replay, "open_viewer", lambda path, web: shown.append((path, web)))
+    recorded = tmp_path / "gust-3"
+    shutil.copytree(flown[0] / "out/gust-3", recorded)
+    (recorded / "recording.rrd").touch()
+    runner = CliRunner()
+    assert runner.invoke(app, ["replay", str(recorded), "--web"]).exit_code == 0
+    assert runner.invoke(app, ["replay", str(recorded / "recording.rrd")]).exit_code == 0
+    changed = runner.invoke(app, ["replay", str(recorded), "--set", "wind.headwind_mps=3"], catch_exceptions=False)
+    assert changed.exit_code == 0
+    assert shown == [
+        (recorded / "recording.rrd", True),
+        (recorded / "recording.rrd", False),
+        (tmp_path / "gust-3-again/recording.rrd", False),
+    ]
+    again = json.loads((tmp_path / "gust-3-again/scenario.json").read_text())
+    assert (again["wind"]["headwind_mps"], again["seed"]) == (3.0, 3)
 
 
 def test_an_interrupted_run_exits_130_and_leaves_nothing(tmp_path: Path) -> None:
