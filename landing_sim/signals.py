@@ -50,7 +50,7 @@ class Touchdown:
 
     t: float  # [s]
     x: float  # [m] of the wheel that touched first
-    y: float  # [m] of the wheel that touched first
+    y: float  # [m] of the middle between the main wheels: a wheel's own is half the track off on a perfect landing
     sink_rate: float  # [m/s] of that wheel, normal to the surface, > 0 downwards
     airspeed: float
     groundspeed: float

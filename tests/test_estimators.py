@@ -28,8 +28,8 @@ def random_state(rng: np.random.Generator) -> np.ndarray:
     x = np.zeros(states.N)
     x[:9] = [50, 0, 1, 0, 0, 0, 0, 0.03, 0] + rng.normal(size=9) * [4, 2, 1, 0.1, 0.1, 0.1, 0.2, 0.05, 0.3]
     x[9:15] = [rng.uniform(-1000, -60), rng.normal() * 40, rng.uniform(2, 60), *rng.normal(size=3) * 3]
-    x[15:20] = rng.normal(size=5) * 0.002
-    x[20] = 29.0
+    x[15:22] = rng.normal(size=7) * 0.002
+    x[states.WIDTH] = 29.0
     return x
 
 
@@ -128,7 +128,7 @@ def test_edge_model_agrees_with_the_image_lines() -> None:
     """Points on the closed-form image line have zero displacement: two derivations of the same edge."""
     rng = np.random.default_rng(0)
     x = random_state(rng)
-    x[states.EPAN : states.ETILT + 1] = 0.0
+    x[states.EPAN : states.JTILT + 1] = 0.0
     R_RB = from_euler(*x[6:9])
     p = np.array([x[9], x[10], -x[11]]) + R_RB @ bench.LEVER
     R_CR = camera_from_body(-0.1, 0.02) @ R_RB.T
@@ -249,7 +249,7 @@ def test_blocks_cover_what_the_kinds_promise() -> None:
     assert tuple(split.starts) == (0, 6, 12)
     assert [states.NAMES[i] for i in split.index[:6]] == ["u", "w", "q", "theta", "x", "H"]
     augmented = Blocks.of(FilterConfig())
-    assert len(augmented.index) == 20
+    assert len(augmented.index) == 22
     with_width = Blocks.of(FilterConfig(width="state"))
     assert states.WIDTH in with_width.index and states.WX not in with_width.index
 

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from landing_sim.estimators.states import EPAN, ETILT, PHI, PSI, THETA, WIDTH, H, X, Y
+from landing_sim.estimators.states import EPAN, ETILT, JPAN, JTILT, PHI, PSI, THETA, WIDTH, H, X, Y
 from landing_sim.geometry.runway_image import EARTH_RADIUS, HORIZON, LEFT, RIGHT, THRESHOLD, plane_normal
 from landing_sim.geometry.so3 import camera_from_body, from_euler
 from landing_sim.jit import kernel
@@ -37,16 +37,16 @@ def edge_model(
     h: Array,
     Hx: Array,
 ) -> None:
-    """Fill h (n,) [px] and Hx (n, 21) = dh/dx for n windows.
+    """Fill h (n,) [px] and Hx (n, 23) = dh/dx for n windows.
 
-    x (21,) layout of `states`; feature (n,) Feature codes; centre, direction (n, 2) [px]; pan, tilt [rad] as the encoders
-    say (their bias is part of x: encoder = true + bias); lever (3,) camera in body axes [m]; focal (3,) f, cx, cy [px].
+    x (23,) layout of `states`; feature (n,) Feature codes; centre, direction (n, 2) [px]; pan, tilt [rad] as the encoders
+    say (their errors are part of x: reading = true + bias + noise); lever (3,) camera in body axes [m]; focal (3,) f, cx, cy [px].
     """
     f, cx, cy = focal[0], focal[1], focal[2]
     phi, theta, psi = x[PHI], x[THETA], x[PSI]
     R_RB = from_euler(phi, theta, psi)
-    true_pan = pan - x[EPAN]
-    R_CB = camera_from_body(true_pan, tilt - x[ETILT])
+    true_pan = pan - x[EPAN] - x[JPAN]
+    R_CB = camera_from_body(true_pan, tilt - x[ETILT] - x[JTILT])
     R_CR = R_CB @ R_RB.T
     p_RC = np.empty(3)
     for k in range(3):
@@ -60,7 +60,7 @@ def edge_model(
     axes[0, 0] = 1.0
     axes[1, 1], axes[1, 2] = cph, -sph
     axes[2, 0], axes[2, 1], axes[2, 2] = -sth, cth * sph, cth * cph
-    axes[3, 2] = -1.0  # true pan = encoder - bias
+    axes[3, 2] = -1.0  # true pan = reading - errors
     axes[4, 0], axes[4, 1] = math.sin(true_pan), -math.cos(true_pan)
 
     Hx[:, :] = 0.0
@@ -122,3 +122,4 @@ def edge_model(
         Hx[i, ETILT] = axes[4, 0] * t0 + axes[4, 1] * t1 + axes[4, 2] * t2
         for k in range(PHI, WIDTH + 1):
             Hx[i, k] *= -1.0 / den
+        Hx[i, JPAN], Hx[i, JTILT] = Hx[i, EPAN], Hx[i, ETILT]

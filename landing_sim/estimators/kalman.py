@@ -232,12 +232,12 @@ def integrated_noise(Phi: Array, q: Array, dt: float, starts: Array) -> Array:
 
 
 @kernel
-def expand(Phi15: Array, index: Array) -> Array:
-    """Transition of the covered states (n, n) from that of aircraft and wind (15, 15); all others stay what they are."""
+def expand(Phi15: Array, index: Array, keep: Array) -> Array:
+    """Transition of the covered states (n, n): aircraft and wind (15, 15) coupled, of all others the share keep (n,)."""
     n = index.shape[0]
     out = np.zeros((n, n))
     for i in range(n):
-        out[i, i] = 1.0
+        out[i, i] = keep[i]
         if index[i] < 15:
             for j in range(n):
                 if index[j] < 15:

@@ -40,6 +40,7 @@ class FilterConfig:
     gyro_sigma: float = 0.1 * RAD  # [rad/s]
     airspeed_sigma: float = 0.5  # [m/s]
     encoder_sigma: float = 0.03 * RAD  # [rad] prior of the platform's encoder bias
+    encoder_noise: float = 0.005 * RAD  # [rad] of each reading, common to all edges of an image
     gyro_bias_sigma: float = 0.1 * RAD
     width_sigma: float = 4.0  # [m] prior, where width is estimated
     wind_sigma: tuple[float, float, float] = (3.0, 3.0, 1.0)  # [m/s] prior
@@ -67,7 +68,7 @@ class Memory:
 
     t: float
     valid: bool
-    x: Array  # (21,)
+    x: Array  # (23,)
     shadow: Array  # (6,) believed actuators, flap, thrust, delayed downwash
     P: Array  # (n, n) covariance, or U where D is given
     D: Array | None
@@ -100,7 +101,7 @@ class Blocks:
             wind: tuple[int, ...] = states.WIND
             if config.width != "known":
                 wind = wind[1:]  # along-track wind and width scale the scene alike: not both
-            groups = [states.PAPER + wind + states.GYRO_BIAS + states.ENCODER_BIAS]
+            groups = [states.PAPER + wind + states.GYRO_BIAS + states.ENCODER]
         if config.width == "state":
             groups[0] += (states.WIDTH,)
         elif config.width == "separate":
@@ -136,6 +137,10 @@ class RunwayEkf:
         q[9:12] = config.q_position**2
         q[12:15] = np.square(config.q_wind)
         q[states.WIDTH] = config.q_width**2
+        self._keep = np.where(np.isin(self.blocks.index, (states.JPAN, states.JTILT)), 0.0, 1.0)
+        self._noise_variance = np.where(self._keep == 0.0, config.encoder_noise**2, 0.0)
+        # a filter that does not know of them takes the readings' errors for noise of the edges
+        self._extra_R = 0.0 if states.JPAN in self.blocks.index else (camera.f * config.encoder_noise) ** 2
         ground = q.copy()
         ground[:3] = config.q_ground_velocity**2
         ground[3:6] = config.q_ground_rates**2
@@ -165,7 +170,8 @@ class RunwayEkf:
         x, shadow = memory.x.copy(), memory.shadow.copy()
         Phi15 = np.empty((15, 15))
         propagate(x, shadow, u, self._par, memory.on_ground, dt, Phi15)
-        Phi = kalman.expand(Phi15, self.blocks.index)
+        x[states.JPAN] = x[states.JTILT] = 0.0  # the next reading's noise is another
+        Phi = kalman.expand(Phi15, self.blocks.index, self._keep)
         phase = "ground" if memory.on_ground else "start" if memory.frames < self.config.start_frames else "air"
         Qd = self._process_noise(Phi, dt, phase)
         P, D = memory.P, memory.D
@@ -222,7 +228,8 @@ class RunwayEkf:
         sd[9:12] = (40.0, 10.0, 5.0)
         sd[12:15] = c.wind_sigma
         sd[15:18] = c.gyro_bias_sigma
-        sd[18:20] = c.encoder_sigma
+        sd[[states.EPAN, states.ETILT]] = c.encoder_sigma
+        sd[[states.JPAN, states.JTILT]] = c.encoder_noise
         sd[states.WIDTH] = c.width_sigma
         return np.square(sd)
 
@@ -242,11 +249,12 @@ class RunwayEkf:
         P = np.diag(var)
         pose = [states.X, states.Y, states.H, states.PHI, states.THETA, states.PSI]
         P[np.ix_(pose, pose)] = m.R
-        # the encoder's bias is in the acquired attitude as well
+        # the encoder's errors are in the acquired attitude as well
         if states.EPAN in idx:
-            for angle, bias in ((states.PSI, states.EPAN), (states.THETA, states.ETILT)):
-                P[angle, angle] += var[bias]
-                P[angle, bias] = P[bias, angle] = var[bias]
+            for angle, errors in ((states.PSI, states.ENCODER[::2]), (states.THETA, states.ENCODER[1::2])):
+                for error in errors:
+                    P[angle, angle] += var[error]
+                    P[angle, error] = P[error, angle] = var[error]
         P = P[np.ix_(idx, idx)]
         for lo, hi in zip(self.blocks.starts, self.blocks.starts[1:]):
             P[lo:hi, :lo] = 0.0
@@ -269,12 +277,14 @@ class RunwayEkf:
         if self.config.process_noise == "constant":
             key = (phase, round(dt * 1e6))
             if key not in self._constant_Q:
-                self._constant_Q[key] = np.diag(q * dt)
+                self._constant_Q[key] = np.diag(q * dt + self._noise_variance)
             return self._constant_Q[key]
-        return kalman.integrated_noise(Phi, q, dt, self.blocks.starts)
+        Qd: Array = kalman.integrated_noise(Phi, q, dt, self.blocks.starts)
+        Qd += np.diag(self._noise_variance)
+        return Qd
 
     def _scalars(self, memory: Memory, Hx: Array, R: Array, nu: Array) -> Memory:
-        """Update by ungated scalars; Hx (m, 21)."""
+        """Update by ungated scalars; Hx (m, 23)."""
         P, D, dx, _ = self._kalman(memory, Hx[:, self.blocks.index], R, nu, np.ones(len(nu), dtype=np.bool_))
         return replace(memory, x=self._moved(memory.x, dx), P=P, D=D)
 
@@ -301,7 +311,7 @@ class RunwayEkf:
         h, Hx = np.empty(n), np.empty((n, states.N))
         starting = memory.frames < c.start_frames
         x = memory.x
-        R = np.where(found, m.R, 1.0)
+        R = np.where(found, m.R + self._extra_R, 1.0)
         innovation: Array | None = None
         status = edges.status.copy()
         use = found

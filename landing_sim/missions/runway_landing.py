@@ -305,6 +305,7 @@ def _estimator(scenario: Scenario, vehicle: Vehicle, camera: BelievedCamera, noi
         process_noise=f.process_noise,
         gate_sigma=f.gate_sigma,
         encoder_sigma=camera.encoder_sigma,
+        encoder_noise=math.radians(scenario.camera.platform.encoder_noise_deg),
         gyro_bias_sigma=math.radians(scenario.sensors.gyro.bias_dps),
     )
     ekf = RunwayEkf(

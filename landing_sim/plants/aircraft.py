@@ -287,11 +287,12 @@ class JsbsimPlant:
         arm = self._contacts.p_B[wheel]
         p = body.p_R + body.R_RB @ arm
         v = body.v_R + body.R_RB @ np.cross(body.pqr, arm)
+        middle = body.p_R + body.R_RB @ (0.5 * (self._contacts.p_B[0] + self._contacts.p_B[1]))
         phi, theta, psi = so3.to_euler(body.R_RB).tolist()
         return Touchdown(
             t=self._tick * self.dt,
             x=float(p[0]),
-            y=float(p[1]),
+            y=float(middle[1]),
             sink_rate=float(v[0] * math.sin(self._slope) + v[2] * math.cos(self._slope)),
             airspeed=self._model.airspeed_fps() * FT,
             groundspeed=math.hypot(body.v_R[0], body.v_R[1]),
