@@ -39,7 +39,7 @@ class Truth:
     beta: float  # [rad]
     surfaces: Array  # (4,) [rad, rad, rad, 0..1] elevator, aileron, rudder, flap: positions reached, not commanded
     thrust: float  # [N] total
-    wheels_height: Array  # (3,) [m] left main, right main, tail or nose: wheel bottom above the runway's surface, normal to it
+    wheels_height: Array  # (3,) [m] left main, right main, tail or nose: wheel bottom above the surface, normal to it
     on_ground: np.ndarray  # (3,) bool, the same wheels
     load_factor: float  # normal, 1 in level flight
 
