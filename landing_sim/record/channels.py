@@ -66,12 +66,12 @@ MODE_COLOURS = {
 }
 
 SPANS = {
-    "errors/x": (-20.0, 20.0),
-    "errors/y": (-1.5, 1.5),
-    "errors/H": (-1.5, 1.5),
-    "errors/phi": (-0.6, 0.6),
-    "errors/theta": (-0.3, 0.3),
-    "errors/psi": (-0.6, 0.6),
+    "errors/x": (-6.0, 6.0),
+    "errors/y": (-0.6, 0.6),
+    "errors/H": (-0.4, 0.4),
+    "errors/phi": (-0.2, 0.2),
+    "errors/theta": (-0.2, 0.2),
+    "errors/psi": (-0.2, 0.2),
     "errors/u": (-2.0, 2.0),
     "errors/wy": (-2.0, 2.0),
 }

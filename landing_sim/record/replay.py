@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     import rerun as rr
 
 TIMELINE = "time"
+SIGHT = 30.0  # [m]
 TRUE_COLOUR, ESTIMATE_COLOUR, BAND_COLOUR = (60, 220, 120), (255, 170, 40), (150, 150, 165)
 IMAGE = "world/camera/image"
 
@@ -137,18 +138,18 @@ class Recorder:
             stream.log(entity, rr.TransformAxes3D(0.0), static=True)
         half, length, slope = 0.5 * scene.width, scene.length, scene.slope
         flat = [
-            ("grass", shapes.grass(scene.width, length, slope), (86, 112, 70)),
-            ("runway", [shapes.rectangle(0.0, length, -half, half, 0.0, slope)], (96, 98, 104)),
+            ("grass", shapes.grass(scene.width, length, slope), (118, 148, 96)),
+            ("runway", [shapes.rectangle(0.0, length, -half, half, 0.0, slope)], (110, 112, 120)),
         ]
         if scene.markings:
             flat.append(("markings", shapes.markings(scene.width, length, slope, 0.6), (240, 240, 240)))
         for name, polygons, colour in flat:
-            vertices, triangles = shapes.polygons(polygons)
-            up = np.tile(np.array([0.0, 0.0, -1.0], np.float32), (len(vertices), 1))
-            stream.log(f"world/{name}", _mesh(vertices, triangles, colour, up), static=True)
-        stream.log(
-            "world/aircraft/body", _mesh(*shapes.aircraft(scene.span, scene.fuselage), (235, 238, 245)), static=True
-        )
+            stream.log(f"world/{name}", _mesh(shapes.polygons(polygons), colour), static=True)
+        body = shapes.aircraft(scene.span, scene.fuselage)
+        stream.log("world/aircraft/body", _mesh(body, (235, 238, 245)), static=True)
+        # The viewer's eye keeps a distance that suits the size of what it follows: specks that make it stand back.
+        specks = rr.Points3D([(-SIGHT, 0.0, 0.0), (SIGHT, 0.0, 0.0)], radii=0.01, colors=(235, 238, 245))
+        stream.log("world/aircraft/sight", specks, static=True)
         pinhole = rr.Pinhole(
             image_from_camera=k.K,
             width=k.width,
@@ -262,7 +263,7 @@ def _blueprint(scene: Scene) -> Any:
             position=(x - 90.0, y - 35.0, z - 24.0),
             look_target=(x, y, z),
             eye_up=(0.0, 0.0, -1.0),
-            tracking_entity="world/aircraft/body",
+            tracking_entity="world/aircraft/sight",
         ),
     )
     image = rrb.Spatial2DView(origin=IMAGE, name="camera: windows (white), measured (yellow), predicted edges")
@@ -287,11 +288,13 @@ def _blueprint(scene: Scene) -> Any:
     )
 
 
-def _mesh(
-    vertices: np.ndarray, triangles: np.ndarray, colour: overlay.Colour, normals: np.ndarray | None = None
-) -> Any:
+def _mesh(mesh: shapes.Mesh, colour: overlay.Colour) -> Any:
+    vertices, triangles = mesh
     return _rerun().Mesh3D(
-        vertex_positions=vertices, triangle_indices=triangles, vertex_normals=normals, albedo_factor=colour
+        vertex_positions=vertices,
+        triangle_indices=triangles,
+        vertex_normals=shapes.normals(mesh),
+        albedo_factor=colour,
     )
 
 

@@ -26,14 +26,25 @@ def rectangle(x0: float, x1: float, y0: float, y1: float, lift: float, slope: fl
     The lift keeps layers apart: coplanar triangles flicker.
     """
     rise = np.tan(slope)
-    return np.array([[x, y, -lift - rise * x] for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))])
+    return np.array([[x, y, -lift - rise * x] for x, y in ((x0, y0), (x0, y1), (x1, y1), (x1, y0))])
 
 
 def grass(width: float, length: float, slope: float) -> list[Array]:
-    """The ground around the runway, left out beneath it: so near to each other both would flicker."""
+    """The ground around the runway. Under it lies a second one, deep enough not to flicker through, to close the seams."""
     half, x0, x1, side = 0.5 * width, -3000.0, length + 2000.0, 1500.0
     pieces = ((x0, 0.0, -side, side), (length, x1, -side, side), (0.0, length, -side, -half), (0.0, length, half, side))
-    return [rectangle(*piece, 0.0, slope) for piece in pieces]
+    return [rectangle(x0, x1, -side, side, -6.0, slope), *(rectangle(*piece, 0.0, slope) for piece in pieces)]
+
+
+def normals(mesh: Mesh) -> np.ndarray:
+    """(n, 3) float32 of flat faces: every vertex belongs to one of them."""
+    vertices, triangles = mesh
+    a, b, c = (vertices[triangles[:, i]] for i in range(3))
+    face = np.cross(b - a, c - a)
+    face /= np.linalg.norm(face, axis=1, keepdims=True)
+    out = np.zeros_like(vertices)
+    out[triangles.ravel()] = np.repeat(face, 3, axis=0)
+    return out
 
 
 def markings(width: float, length: float, slope: float, lift: float) -> list[Array]:
