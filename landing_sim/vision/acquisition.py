@@ -11,7 +11,8 @@ Source     own; the accuracy aimed at is that of a trial implementation (range 0
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +22,10 @@ from landing_sim.signals import CameraSample, Feature, Status
 from landing_sim.types import Array
 from landing_sim.vision.believed import BelievedCamera, RunwayMap
 from landing_sim.vision.hough import borders, depth_profile, edge_points, horizon_line
+from landing_sim.vision.prediction import camera_pose
 from landing_sim.vision.windows import EdgeConfig, SearchConfig, WindowPlanner
+
+_PROFILE_BIAS = 0.3  # [px] of the threshold in the mean of many lines: paint beside the strips
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +33,9 @@ class AcquisitionConfig:
     """Limits of what is searched, and when a result is believed.
 
     edge_snr of an edge point; max_roll, max_heading [rad] of the camera against the horizon and of the runway against the
-    optical axis; heights [m] of the camera above the runway; horizon_share of the image's width that it must span;
-    min_points of each border, geometric mean; max_residual: rms of the final residuals over their standard deviations.
+    optical axis; heights and range [m] of the camera over and from the threshold; horizon_share of the image's width that
+    it must span; min_points of each border, geometric mean; max_residual: rms of the final residuals over their standard
+    deviations; max_contrast_ratio between the runway's three edges; hypotheses: pairs of borderlines tried, best first.
     """
 
     edge_snr: float = 4.5
@@ -38,9 +43,12 @@ class AcquisitionConfig:
     max_heading: float = math.radians(28.0)
     min_height: float = 1.5
     max_height: float = 300.0
+    max_range: float = 3000.0
     horizon_share: float = 0.5
     min_points: float = 12.0
     max_residual: float = 4.0
+    max_contrast_ratio: float = 2.2
+    hypotheses: int = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +58,17 @@ class Acquired:
     z: Array | None
     R: Array | None
     reason: str = ""
+
+
+class _Seen(NamedTuple):
+    """The edges found in one image, (n,) or (n, 2)."""
+
+    feature: np.ndarray
+    centre: Array
+    direction: Array
+    z: Array
+    variance: Array
+    contrast: Array
 
 
 class Acquisition:
@@ -68,7 +87,8 @@ class Acquisition:
         k = camera.intrinsics
         self._lens: Array = np.array([k.f, k.cx, k.cy], dtype=float)
         self._counts = np.array([16, 16, 9, 16], dtype=np.int64)
-        # wide first, then just wide enough for what is left
+        # weak edges are welcome where there are many of them; wide first, then just wide enough for what is left
+        edges = replace(edges or EdgeConfig(), min_snr=3.0)
         self._planners = [
             WindowPlanner(runway, camera, SearchConfig(search_min=s, search_max=s), edges) for s in (12, 6, 4)
         ]
@@ -81,57 +101,85 @@ class Acquisition:
         if not found:
             return Acquired(None, None, "no horizon in view")
         below = points[points[:, 1] > a + b * points[:, 0] + 2.0]
-        R_CB = camera_from_body(pan, tilt)
-        pose, reason = self._coarse(image, below, a, b, R_CB)
-        if pose is None:
-            return Acquired(None, None, reason)
-        return self._fine(sample, pose, pan, tilt)
+        tried, reason = np.empty((0, 3)), ""
+        for _ in range(c.hypotheses):
+            pair = self._borders(below, a, b, tried)
+            if pair is None:
+                break
+            tried = np.vstack([tried, pair[1:4]])
+            got = self._from_pair(sample, pair, pan, tilt)
+            if got.z is not None:
+                return got
+            reason = reason or got.reason  # the best pair's
+        return Acquired(None, None, reason or "no pair of borderlines")
 
-    def _coarse(self, image: np.ndarray, below: Array, a: float, b: float, R_CB: Array) -> tuple[Array | None, str]:
-        c, width, slope = self._config, self._runway.width, self._runway.slope
+    def _borders(self, below: Array, a: float, b: float, tried: Array) -> tuple[Array, float, float, float] | None:
+        """R_LC, heading, K_left, K_right of the best pair of borderlines not yet tried; see `borders`."""
+        c, width = self._config, self._runway.width
         polarity = 1.0 if self._runway.brighter else -1.0
-        step, height = 1.5 / self._lens[0], 30.0  # the height only bends the first horizon, by 3 mrad
+        limits = width / c.max_height, width / c.min_height
+        step, height = 2.0 / self._lens[0], 30.0  # the height only bends the first horizon, by 3 mrad
         headings = np.arange(-c.max_heading, c.max_heading, step)
         for _ in range(2):
             R_LC = level_from_horizon(a, b, self._lens, horizon_dip(height))
             score, heading, k_left, k_right = borders(
-                below, R_LC, self._lens, slope, polarity, headings, width / c.max_height, width / c.min_height
+                below, R_LC, self._lens, self._runway.slope, polarity, headings, *limits, tried
             )
             if score < c.min_points:
-                return None, f"no pair of borderlines: {score:.0f} edge points at best, {c.min_points:.0f} wanted"
+                return None
             height = width / (k_right - k_left)
-            headings = heading + np.arange(-0.03, 0.03, 0.5 * step)
+            headings = heading + np.arange(-0.03, 0.03, 0.25 * step)
+        return R_LC, heading, k_left, k_right
+
+    def _from_pair(
+        self, sample: CameraSample, pair: tuple[Array, float, float, float], pan: float, tilt: float
+    ) -> Acquired:
+        R_LC, heading, k_left, k_right = pair
+        height = self._runway.width / (k_right - k_left)
         y = -0.5 * (k_left + k_right) * height
-
-        ca, sa, cs, ss = math.cos(heading), math.sin(heading), math.cos(slope), math.sin(slope)
+        ca, sa, slope = math.cos(heading), math.sin(heading), self._runway.slope
         R_RC = np.array([[ca, sa, 0.0], [-sa, ca, 0.0], [0.0, 0.0, 1.0]]) @ R_LC
-        R_DR = np.array([[cs, 0.0, -ss], [0.0, 1.0, 0.0], [ss, 0.0, cs]])  # along, right, down normal to the runway
-        distance = self._threshold(image, R_RC.T @ R_DR.T, height, y, polarity)
-        if distance is None:
-            return None, "borderlines found, but no threshold between them"
-        x, H = -(distance * cs + height * ss), height * cs - distance * ss
-        R_RB = R_RC @ R_CB
-        p_RB = np.array([x, y, -H]) - R_RB @ np.array(self._camera.p_BC)
-        return np.array([p_RB[0], p_RB[1], -p_RB[2], *to_euler(R_RB)]), ""
+        found = self._threshold(sample.frame.full(), R_RC, height, y)
+        if found is None:
+            return Acquired(None, None, "borderlines found, but no threshold between them")
+        distance = found[0]
+        x = -(distance * math.cos(slope) + height * math.sin(slope))
+        z = distance * math.sin(slope) - height * math.cos(slope)
+        R_RB = R_RC @ camera_from_body(pan, tilt)
+        p_RB = np.array([x, y, z]) - R_RB @ np.array(self._camera.p_BC)
+        return self._fine(sample, np.array([p_RB[0], p_RB[1], -p_RB[2], *to_euler(R_RB)]), pan, tilt)
 
-    def _threshold(self, image: np.ndarray, R_CD: Array, height: float, y: float, polarity: float) -> float | None:
-        """Distance [m] ahead of the camera along the runway at which the strips free of paint begin."""
+    def _threshold(self, image: np.ndarray, R_RC: Array, height: float, y: float) -> tuple[float, Array, float] | None:
+        """Where the strips free of paint begin, seen from `height` [m] above the runway's surface, y [m] off its middle.
+
+        Returns the distance [m] ahead of the camera along the runway, the threshold centre's pixel (2,) and the variance
+        [px^2] of its place along the runway's image; None if there is no such edge.
+        """
+        slope, f = self._runway.slope, self._lens[0]
+        cs, ss = math.cos(slope), math.sin(slope)
+        R_CD = R_RC.T @ np.array([[cs, 0.0, ss], [0.0, 1.0, 0.0], [-ss, 0.0, cs]])  # D: along, right, down normal
         strips = self._runway.clean_strips()
-        offsets = np.concatenate([s[0] + (s[1] - s[0]) * np.array([0.35, 0.5, 0.65]) for s in strips]) - y
-        scale = height * self._lens[0]  # pixels below the horizon, times metres
+        offsets = np.concatenate([s[0] + (s[1] - s[0]) * np.linspace(0.25, 0.75, 5) for s in strips]) - y
+        scale = height * f  # pixels below the horizon, times metres
         nearest = 1.0 / max(10.0, 2.0 * height)
-        g = depth_profile(image, R_CD, self._lens, height, offsets, nearest, int(scale * nearest))
-        if len(g) < 9:
+        farthest = max(1.0 / self._config.max_range, (horizon_dip(height) + 8.0 / f) / height)
+        g = depth_profile(image, R_CD, self._lens, height, offsets, nearest, int(scale * (nearest - farthest)))
+        if len(g) < 12:
             return None
+        mask = np.array([-1.0, -1.0, -1.0, 0.0, 1.0, 1.0, 1.0]) / 3.0
         response = np.full(len(g), -np.inf)
-        mask = polarity * np.array([-1.0, -1.0, -1.0, 0.0, 1.0, 1.0, 1.0]) / 3.0
-        response[3:-3] = np.correlate(g, mask)
+        response[3:-3] = np.correlate(g, mask) * (1.0 if self._runway.brighter else -1.0)
         response[np.isnan(response)] = -np.inf
-        k = int(np.argmax(response))
-        noise = self._camera.noise * math.sqrt(2.0 / 3.0 / len(offsets))
-        if not response[k] > max(4.0, 5.0 * noise) or nearest * scale - k <= 0.0:
+        k = int(np.argmax(response[1:-1])) + 1
+        before, peak, after = response[k - 1 : k + 2]
+        independent = 0.6 * len(offsets)  # neighbouring lines share pixels
+        noise = self._camera.noise / math.sqrt(independent)
+        if not (peak > max(3.0, 3.2 * noise * math.sqrt(2.0 / 3.0)) and np.isfinite(before + after)):
             return None
-        return 1.0 / (nearest - k / scale)
+        rho = nearest - (k + 0.5 * (after - before) / (2.0 * peak - after - before)) / scale
+        ray = R_CD @ np.array([1.0, -rho * y, rho * height])
+        uv = self._lens[1:] + f * ray[:2] / ray[2]
+        return 1.0 / rho, uv, 3.5 * (noise / peak) ** 2 + _PROFILE_BIAS**2
 
     def _fine(self, sample: CameraSample, pose: Array, pan: float, tilt: float) -> Acquired:
         """Gauss-Newton with Huber weights on windows placed along the predicted lines, search narrowing."""
@@ -139,17 +187,19 @@ class Acquisition:
         r, J = nothing, nothing
         for planner in (*self._planners, self._planners[-1]):
             w = planner.place(pose, cov, pan, tilt, self._counts)
-            z, variance, _, status = planner.measure(sample.frame, w)
-            ok = status == Status.FOUND
-            feature = w.feature[ok]
-            for name, least in ((Feature.LEFT, 3), (Feature.RIGHT, 3), (Feature.THRESHOLD, 1), (Feature.HORIZON, 2)):
-                if np.count_nonzero(feature == name) < least:
+            z, variance, contrast, status = planner.measure(sample.frame, w)
+            weak = contrast < 3.7 * self._camera.noise / np.sqrt(2.0 * w.half + 1.0)  # 4.5 sigma
+            ok = (status == Status.FOUND) & ~(weak & (w.feature == Feature.THRESHOLD))
+            seen = _Seen(w.feature[ok], w.centre[ok], w.direction[ok], z[ok], variance[ok], contrast[ok])
+            if not np.any(seen.feature == Feature.THRESHOLD):
+                seen = self._with_threshold(sample, seen, pose, pan, tilt)
+            for name in Feature:
+                if np.count_nonzero(seen.feature == name) < (1 if name == Feature.THRESHOLD else 2):
                     return Acquired(None, None, f"too few windows found on the {name.name.lower()} edge")
-            centre, direction = w.centre[ok], w.direction[ok]
-            sigma = np.sqrt(variance[ok])
+            sigma = np.sqrt(seen.variance)
             for _ in range(3):
-                h, J = planner.predict(feature, centre, direction, pose, pan, tilt)
-                r, J = (z[ok] - h) / sigma, J / sigma[:, None]
+                h, J = planner.predict(seen.feature, seen.centre, seen.direction, pose, pan, tilt)
+                r, J = (seen.z - h) / sigma, J / sigma[:, None]
                 limit = 2.0 * max(1.0, float(np.median(np.abs(r))))
                 weight = np.minimum(1.0, limit / np.maximum(np.abs(r), 1e-9))
                 try:
@@ -159,13 +209,39 @@ class Acquisition:
             pose[3:] = [wrap(angle) for angle in pose[3:]]
             if not np.all(np.isfinite(pose)) or pose[2] < 0.0 or pose[2] > 2.0 * self._config.max_height:
                 return Acquired(None, None, "the fit left the runway")
-        h, _ = planner.predict(feature, centre, direction, pose, pan, tilt)
-        r = (z[ok] - h) / sigma
+        # the same two materials meet at all three edges of the runway; paint taken for one of them shows here
+        left, right, near = (
+            float(np.median(seen.contrast[seen.feature == f])) for f in (Feature.LEFT, Feature.RIGHT, Feature.THRESHOLD)
+        )
+        if max(left, right, near) > self._config.max_contrast_ratio * min(left, right, near):
+            return Acquired(None, None, f"edges of different contrast: {left:.0f}, {right:.0f}, threshold {near:.0f}")
+        h, _ = planner.predict(seen.feature, seen.centre, seen.direction, pose, pan, tilt)
+        r = (seen.z - h) / sigma
         spread = float(np.sqrt(np.mean(np.minimum(r * r, 25.0))))
         if spread > self._config.max_residual:
             return Acquired(None, None, f"edges do not fit a runway: residuals {spread:.1f} sigma")
         R = np.linalg.inv(J.T @ J) * max(1.0, spread) ** 2 + self._encoder_covariance(pose, pan, tilt)
         return Acquired(pose, 0.5 * (R + R.T))
+
+    def _with_threshold(self, sample: CameraSample, seen: _Seen, pose: Array, pan: float, tilt: float) -> _Seen:
+        """Where the threshold is too faint for single windows: its place in the mean of all clean strips instead."""
+        p_RC, R_CR = camera_pose(pose, np.array(self._camera.p_BC), pan, tilt)
+        slope = self._runway.slope
+        height = -p_RC[2] * math.cos(slope) - p_RC[0] * math.sin(slope)
+        found = self._threshold(sample.frame.full(), R_CR.T, height, p_RC[1])
+        if found is None:
+            return seen
+        _, uv, variance = found
+        along = self._lens[0] * R_CR[:2, 0] - (uv - self._lens[1:]) * R_CR[2, 0]  # image of the runway's direction
+        borders = seen.contrast[seen.feature <= Feature.RIGHT]
+        return _Seen(
+            np.append(seen.feature, int(Feature.THRESHOLD)),
+            np.vstack([seen.centre, uv]),
+            np.vstack([seen.direction, along / np.linalg.norm(along)]),
+            np.append(seen.z, 0.0),
+            np.append(seen.variance, variance),
+            np.append(seen.contrast, np.median(borders) if len(borders) else 0.0),
+        )
 
     def _encoder_covariance(self, pose: Array, pan: float, tilt: float) -> Array:
         """(6, 6): the image fixes the camera's attitude; the body's inherits the platform's error."""

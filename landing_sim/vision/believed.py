@@ -11,7 +11,6 @@ from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.signals import Feature
 from landing_sim.types import Array
 
-
 # Aiming points and touchdown zones of both directions of a 29 m x 1680 m runway, mark pairs as one box: ICAO Annex 14,
 # vol. I, 5.2.5 and 5.2.6, with the lateral positions moved inwards to leave 3 m to the edges.
 AIMING_AND_TOUCHDOWN = tuple(
@@ -66,8 +65,8 @@ class RunwayMap:
     """The runway as the onboard side believes it to be.
 
     width, length [m]; slope [rad] > 0 uphill along x; `paint` are further painted rectangles (x0, x1, y0, y1) [m] that a
-    search for a borderline must not reach (the default fits the default size); `brighter`: the runway is brighter than its surroundings, which decides the
-    polarity of its edges (the sky is always taken as brighter than the ground).
+    search for a borderline must not reach (the default fits the default size); `brighter`: the runway is brighter than its
+    surroundings, which decides the polarity of its edges (the sky is always taken as brighter than the ground).
     """
 
     width: float = 29.0

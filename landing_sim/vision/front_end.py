@@ -36,14 +36,24 @@ class FrontEndConfig:
 class RunwayFrontEnd:
     """interfaces.FrontEnd for the sensor "camera".
 
-    While the estimate is not valid, or says that it is lost, each image is searched for the runway: a measurement "pose" (x,
-    y, H of the cg, phi, theta, psi; R (6, 6)), or none, with `reason` telling why. Else windows are placed by prediction:
-    a measurement "edges" with R (n,) variances [px^2].
+    While the estimate is not valid, or says that it is lost, each image is searched for the runway: a measurement "pose"
+    (x, y, H of the cg, phi, theta, psi; R (6, 6)), or none, with `reason` telling why. Else windows are placed by
+    prediction: a measurement "edges" with R (n,) variances [px^2].
 
     Holds no memory between frames but `reason`, which nothing reads back.
     """
 
-    __slots__ = ("_acquisition", "_columns", "_counts", "_encoder", "_names", "_planner", "_unknown", "reason", "sensor")
+    __slots__ = (
+        "_acquisition",
+        "_columns",
+        "_counts",
+        "_encoder",
+        "_names",
+        "_planner",
+        "_unknown",
+        "reason",
+        "sensor",
+    )
 
     def __init__(self, runway: RunwayMap, camera: BelievedCamera, config: FrontEndConfig | None = None) -> None:
         config = config or FrontEndConfig()
@@ -70,7 +80,9 @@ class RunwayFrontEnd:
         if estimate.names is not self._names:
             missing = [name for name in POSE if name not in estimate.names]
             if missing:
-                raise ValueError(f"camera front end: the estimate lacks {', '.join(missing)}; it needs {', '.join(POSE)}")
+                raise ValueError(
+                    f"camera front end: the estimate lacks {', '.join(missing)}; it needs {', '.join(POSE)}"
+                )
             self._names = estimate.names
             self._columns = np.array([estimate.names.index(name) for name in POSE])
         cols = self._columns

@@ -13,7 +13,8 @@ from landing_sim.jit import kernel
 from landing_sim.types import Array
 
 SMOOTH = 2.0  # [px] sigma of the derivative filter
-_BINS = 360  # directions about the vanishing point, half a degree each
+_BINS = 4000  # directions about the vanishing point, at most
+_BIN = 1.5  # [px] their width at the points' mean distance
 
 
 def edge_points(image: np.ndarray, noise: float, snr: float) -> Array:
@@ -121,31 +122,40 @@ def horizon_line(points: Array, width: int, height: int, max_roll: float, share:
 
 @kernel
 def borders(
-    points: Array, R_LC: Array, lens: Array, slope: float, polarity: float, headings: Array, k_min: float, k_max: float
+    points: Array,
+    R_LC: Array,
+    lens: Array,
+    slope: float,
+    polarity: float,
+    headings: Array,
+    k_min: float,
+    k_max: float,
+    tried: Array,
 ) -> tuple[float, float, float, float]:
     """score, heading [rad], K_left, K_right of the pair of lines that looks most like a runway's borders.
 
     In the levelled frame L (x along the optical axis, horizontal; z down) the runway runs at an unknown heading. A straight
     line along it, b to the right and h below the camera (normal to its surface), is the set of rays with b / h = K. For
-    each heading tried the edge points are sorted by atan K and by whether brightness rises with K; the left border is
+    each heading tried the edge points are sorted by the direction K in which they lie from the vanishing point, in bins as
+    wide as an edge is at their mean distance from it, and by whether brightness rises with K; the left border is
     a rising one (polarity +1), the right border a falling one, k_min <= K_right - K_left <= k_max. Score: the geometric
-    mean of the points of both.
+    mean of the numbers of points of both. Pairs like one of the rows heading, K_left, K_right of `tried` are passed over.
     """
     n = len(points)
     rising, falling = np.zeros(_BINS + 2), np.zeros(_BINS + 2)
     best, heading, left, right = 0.0, 0.0, 0.0, 0.0
     cs, ss = math.cos(slope), math.sin(slope)
+    where = np.empty(n)
+    y, w = np.empty(3), np.empty(3)
     for t in range(len(headings)):
         ca, sa = math.cos(headings[t]), math.sin(headings[t])
-        rising[:] = 0.0
-        falling[:] = 0.0
-        # y' and depth below the camera, both linear in (u, v, 1)
-        y, w = np.empty(3), np.empty(3)
-        for c in range(3):
+        for c in range(3):  # offset to the right and depth below the camera, both linear in (u, v, 1)
             x_c = ca * R_LC[0, c] + sa * R_LC[1, c]
             y[c] = -sa * R_LC[0, c] + ca * R_LC[1, c]
             w[c] = ss * x_c + cs * R_LC[2, c]
+        total, m = 0.0, 0
         for i in range(n):
+            where[i] = math.nan
             a, b = (points[i, 0] - lens[1]) / lens[0], (points[i, 1] - lens[2]) / lens[0]
             p, q = y[0] * a + y[1] * b + y[2], w[0] * a + w[1] * b + w[2]
             if q <= 1e-3:  # above or at the horizon
@@ -154,23 +164,48 @@ def borders(
             along = du * points[i, 2] + dv * points[i, 3]
             if along * along < 0.85 * (du * du + dv * dv) * (points[i, 2] ** 2 + points[i, 3] ** 2):
                 continue
-            k = int((math.atan2(p, q) / math.pi + 0.5) * _BINS) + 1
-            if along * polarity > 0.0:
-                rising[k] += 1.0
-            else:
-                falling[k] += 1.0
-        for i in range(1, _BINS + 1):
+            # p / (|p| + q) grows with K from -1 to 1; falling edges are set off by 3
+            where[i] = p / (abs(p) + q) + (1.0 if along * polarity > 0.0 else 4.0)
+            total += math.sqrt(p * p + q * q)
+            m += 1
+        if m == 0:
+            continue
+        bins = min(_BINS, max(90, int(2.0 * lens[0] * total / m / _BIN)))
+        rising[: bins + 2] = 0.0
+        falling[: bins + 2] = 0.0
+        for i in range(n):
+            if where[i] < 2.0:
+                rising[int(0.5 * where[i] * bins) + 1] += 1.0
+            elif where[i] >= 3.0:
+                falling[int(0.5 * (where[i] - 3.0) * bins) + 1] += 1.0
+        for i in range(1, bins + 1):
             L = 0.5 * rising[i - 1] + rising[i] + 0.5 * rising[i + 1]
-            if L * n <= best * best:
+            if L * m <= best * best:
                 continue
-            k_l = math.tan((i - 0.5) / _BINS * math.pi - 0.5 * math.pi)
-            for j in range(i + 1, _BINS + 1):
+            for j in range(i + 1, bins + 1):
                 F = 0.5 * falling[j - 1] + falling[j] + 0.5 * falling[j + 1]
-                if L * F > best * best:
-                    k_r = math.tan((j - 0.5) / _BINS * math.pi - 0.5 * math.pi)
-                    if k_min <= k_r - k_l <= k_max:
-                        best, heading, left, right = math.sqrt(L * F), headings[t], k_l, k_r
+                score = math.sqrt(L * F)
+                if score > best:
+                    k_l, k_r = _tangent(i, bins), _tangent(j, bins)
+                    if k_min <= k_r - k_l <= k_max and not _like(headings[t], k_l, k_r, tried):
+                        best, heading, left, right = score, headings[t], k_l, k_r
     return best, heading, left, right
+
+
+@kernel
+def _like(heading: float, k_l: float, k_r: float, tried: Array) -> bool:
+    for i in range(len(tried)):
+        near = 0.12 * (tried[i, 2] - tried[i, 1])
+        if abs(heading - tried[i, 0]) < 0.03 and abs(k_l - tried[i, 1]) < near and abs(k_r - tried[i, 2]) < near:
+            return True
+    return False
+
+
+@kernel
+def _tangent(i: int, bins: int) -> float:
+    """K in the middle of bin i (from 1)."""
+    s = 2.0 * (i - 0.5) / bins - 1.0
+    return s / (1.0 - abs(s))
 
 
 @kernel

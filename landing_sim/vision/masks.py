@@ -81,7 +81,7 @@ def profile(
         u0, v0 = u + j * au - reach * du, v + j * av - reach * dv
         for k in range(2 * reach + 1):
             x, y = u0 + k * du, v0 + k * dv
-            iu, iv = int(math.floor(x)), int(math.floor(y))
+            iu, iv = math.floor(x), math.floor(y)
             a, b = x - iu, y - iv
             top, bottom = float(image[iv, iu]), float(image[iv + 1, iu])
             if a > 0.0:
@@ -110,9 +110,9 @@ def measure(
     ----------
     images : (m, h, w) uint8: pixels of the windows look (m,), rows of F and I (see `placement`)
     polarity : (4,) by Feature: +1 if brightness rises along the step, else -1
-    rule : blur [px] sigma of the optics; noise [grey levels] sigma of a pixel; min_contrast [grey levels]; min_snr, contrast
-        over its own standard deviation; ambiguity: an edge is doubtful if another one in the window has more than this
-        share of its contrast; floor [px] standard deviation added for what the model of an edge leaves out
+    rule : blur [px] sigma of the optics; noise [grey levels] sigma of a pixel; min_contrast [grey levels]; min_snr,
+        contrast over its own standard deviation; ambiguity: an edge is doubtful if another one in the window has more than
+        this share of its contrast; floor [px] standard deviation added for what the model of an edge leaves out
 
     Returns
     -------

@@ -1,8 +1,8 @@
 """Putting windows on the predicted lines: the compiled part of `windows`.
 
-A window is a row of two arrays: floats F (n, 12) and integers I (n, 6), in the columns named below. Along its predicted line
-each gets an exact centre, a search path, a mask length and a search range; what cannot be looked at keeps its row and gets
-a status.
+A window is a row of two arrays: floats F (n, 12) and integers I (n, 6), in the columns named below. Along its predicted
+line each gets an exact centre, a search path, a mask length and a search range; what cannot be looked at keeps its row and
+gets a status.
 """
 
 from __future__ import annotations
@@ -11,13 +11,14 @@ import math
 
 import numpy as np
 
-from landing_sim.geometry.runway_image import HORIZON, LEFT, RIGHT, THRESHOLD, displacement
+from landing_sim.geometry.runway_image import HORIZON, LEFT, RIGHT, THRESHOLD
 from landing_sim.jit import kernel
 from landing_sim.types import Array
 from landing_sim.vision.masks import REACH
 from landing_sim.vision.prediction import NEAR, View, cut, dot, feature_line, in_image, look, oriented, spread
 
-CENTRE, DIRECTION, STEP, ALONG, ORIGIN, NORMAL_STEP, OFFSET = 0, 2, 4, 6, 8, 10, 11  # columns of F; the first five take two
+# columns of F; the first five take two
+CENTRE, DIRECTION, STEP, ALONG, ORIGIN, NORMAL_STEP, OFFSET = 0, 2, 4, 6, 8, 10, 11
 FEATURE, STATUS, HALF, SEARCH, CORNER = 0, 1, 2, 3, 4  # columns of I; CORNER takes two
 MASK, SIGMAS, SEARCH_MIN, SEARCH_MAX, EXTRA_SIGMA, SEPARATION = 0, 1, 2, 3, 4, 5  # fields of the rule
 
@@ -94,7 +95,7 @@ def _footprint(
 @kernel
 def _blocked(rows: Array, side: int, s0: float, s1: float, depth: float) -> bool:
     """Whether a footprint meets one of the rows x0, x1, Feature, clear distance."""
-    for k in range(len(rows)):
+    for k in range(len(rows)):  # noqa: SIM110 a generator cannot be compiled
         if rows[k, 2] == side and s1 > rows[k, 0] and s0 < rows[k, 1] and depth > rows[k, 3]:
             return True
     return False
@@ -102,7 +103,16 @@ def _blocked(rows: Array, side: int, s0: float, s1: float, depth: float) -> bool
 
 @kernel
 def _place_border(
-    F: Array, I: np.ndarray, at: int, n: int, side: int, view: View, sigma: float, rule: Array, paint: Array, mouths: Array
+    F: Array,
+    I: np.ndarray,
+    at: int,
+    n: int,
+    side: int,
+    view: View,
+    sigma: float,
+    rule: Array,
+    paint: Array,
+    mouths: Array,
 ) -> None:
     """n windows in rows at.. on the visible part of a borderline, spread from its near to its far end.
 
@@ -189,16 +199,20 @@ def _place_threshold(
     blurred = 2.0 * _BESIDE * math.hypot(su, sv) / abs(su * av - sv * au)
     n_strips, n_usable = len(strips), 0
     ends, room = np.empty((n_strips, 4)), np.empty(n_strips)
-    for k in range(n_strips):
-        q_a, q_b = q + strips[k, 0] * view.across, q + strips[k, 1] * view.across
-        if q_a[2] < NEAR or q_b[2] < NEAR:
-            continue
-        e = ends[n_usable]
-        e[0], e[1] = q_a[0] / q_a[2], q_a[1] / q_a[2]
-        e[2], e[3] = q_b[0] / q_b[2] - e[0], q_b[1] / q_b[2] - e[1]
-        room[n_usable] = max(abs(e[2]), abs(e[3])) - blurred
-        if room[n_usable] >= 1.0:
-            n_usable += 1
+    for attempt in range(2):  # far off and from the side no strip has room for the full distance: then half of it
+        n_usable = 0
+        for k in range(n_strips):
+            q_a, q_b = q + strips[k, 0] * view.across, q + strips[k, 1] * view.across
+            if q_a[2] < NEAR or q_b[2] < NEAR:
+                continue
+            e = ends[n_usable]
+            e[0], e[1] = q_a[0] / q_a[2], q_a[1] / q_a[2]
+            e[2], e[3] = q_b[0] / q_b[2] - e[0], q_b[1] / q_b[2] - e[1]
+            room[n_usable] = max(abs(e[2]), abs(e[3])) - blurred / (1.0 + attempt)
+            if room[n_usable] >= 1.0:
+                n_usable += 1
+        if n_usable > 0:
+            break
     seen, per_strip = 0, (n + n_usable - 1) // max(1, n_usable)
     for turn in range(per_strip):
         for k in range(n_usable):
@@ -213,9 +227,12 @@ def _place_threshold(
             if mu <= u <= view.frame[0] - 1.0 - mu and mv <= v <= view.frame[1] - 1.0 - mv:
                 _put(F, I, at + seen, u, v, su, sv, au, av, advance, half, search)
                 seen += 1
-    if n_usable == 0 and in_image(q, view.across, -0.5 * view.runway[0], 0.5 * view.runway[0], 0.0, 0.0, view.frame)[0] < 0.0:
-        for i in range(at, at + n):
-            I[i, STATUS] = _SHORT
+    if n_usable == 0:
+        reach = 0.5 * view.runway[0]
+        lo, hi = in_image(q, view.across, -reach, reach, 0.0, 0.0, view.frame)
+        if lo < hi:
+            for i in range(at, at + n):
+                I[i, STATUS] = _SHORT
     return seen
 
 
@@ -282,7 +299,7 @@ def place(
     sigma = spread(view, pose, cov, lever, pan, tilt, rule[EXTRA_SIGMA])
     most = counts[0] + counts[1] + 2 * counts[2] + counts[3]
     F, I = np.zeros((most, 12)), np.zeros((most, 6), dtype=np.int64)
-    F[:, : DIRECTION] = np.nan
+    F[:, :DIRECTION] = np.nan
     n_T = counts[THRESHOLD]
     seen = _place_threshold(F, I, 0, n_T, view, sigma[THRESHOLD], rule, strips)
     n_L, n_R = counts[LEFT] + (n_T - seen + 1) // 2, counts[RIGHT] + (n_T - seen) // 2
@@ -297,7 +314,7 @@ def place(
         if I[i, STATUS] == _OK:
             for c in range(2):
                 reach = (I[i, SEARCH] + REACH) * abs(F[i, STEP + c]) + I[i, HALF] * abs(F[i, ALONG + c])
-                size[c] = max(size[c], 2 * int(math.ceil(reach)) + 4)
+                size[c] = max(size[c], 2 * math.ceil(reach) + 4)
     for c in range(2):
         size[c] = min(size[c], int(frame[c]))
     for i in range(n):
@@ -307,6 +324,6 @@ def place(
             F[i, OFFSET] = shift * math.hypot(F[i, STEP], F[i, STEP + 1])
             for k in range(2):
                 F[i, ORIGIN + k] = F[i, CENTRE + k] + shift * F[i, STEP + k]
-                low = int(math.floor(F[i, CENTRE + k])) - size[k] // 2 + 1
+                low = math.floor(F[i, CENTRE + k]) - size[k] // 2 + 1
                 I[i, CORNER + k] = min(int(frame[k]) - size[k], max(0, low))
     return F, I, size[0], size[1]

@@ -182,7 +182,7 @@ def spread(view: View, pose: Array, cov: Array, lever: Array, pan: float, tilt: 
         direction[i, 0], direction[i, 1] = view.lines[side, 0], view.lines[side, 1]
         centre[i, 0], centre[i, 1] = view.lens[1] + (which - 0.5) * 0.8 * view.frame[0], view.lens[2]
         q = np.zeros(3)
-        if side == LEFT or side == RIGHT:
+        if side in (LEFT, RIGHT):
             q0 = view.threshold + (side - 0.5) * view.runway[0] * view.across
             lo, hi = in_image(q0, view.along, 0.0, view.runway[1], 0.0, 0.0, view.frame)
             if lo < hi:

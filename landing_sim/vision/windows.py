@@ -96,7 +96,7 @@ class Windows:
     """Windows as `placement` lays them out: rows of F (n, 12) and I (n, 6), all of size width x height [px]."""
 
     F: Array
-    I: np.ndarray  # noqa: E741
+    I: np.ndarray
     width: int
     height: int
 
@@ -120,6 +120,11 @@ class Windows:
         return self.F[:, col.DIRECTION : col.DIRECTION + 2].copy()
 
     @property
+    def half(self) -> np.ndarray:
+        """(n,) int64: masks average 2 half + 1 pixels."""
+        return self.I[:, col.HALF].copy()
+
+    @property
     def corner(self) -> np.ndarray:
         """(n, 2) int64 u, v of the top-left pixels."""
         return self.I[:, col.CORNER : col.CORNER + 2].copy()
@@ -128,7 +133,18 @@ class Windows:
 class WindowPlanner:
     """Lays out the windows of a frame and measures them: the believed runway and camera, made ready once."""
 
-    __slots__ = ("_constants", "_edges", "_frame", "_lens", "_lever", "_noise", "_polarity", "_rule", "camera", "runway")
+    __slots__ = (
+        "_constants",
+        "_edges",
+        "_frame",
+        "_lens",
+        "_lever",
+        "_noise",
+        "_polarity",
+        "_rule",
+        "camera",
+        "runway",
+    )
 
     def __init__(
         self,
