@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from landing_sim.errors import ConfigError, Mark, Problem
+from landing_sim.errors import ConfigError, Mark, Problem, did_you_mean
 
 if TYPE_CHECKING:
     from landing_sim.scenario import Scenario
@@ -87,7 +87,19 @@ def reproduce(
     json_: JsonOption = False,
 ) -> None:
     """Measure every claim of a paper: one row each, and the figures redrawn, in one HTML report."""
-    raise NotImplementedError
+    from landing_sim.papers import PAPERS
+
+    if paper not in PAPERS:
+        near = did_you_mean(paper, PAPERS) or f"; there are: {', '.join(PAPERS)}"
+        raise ConfigError([Problem(Mark(paper), (), f"no such paper{near}")])
+    from landing_sim import progress
+    from landing_sim.papers import reproduction
+
+    result = reproduction.reproduce(PAPERS[paper], out or Path("out") / paper, lambda text: typer.echo(text, err=True))
+    if json_:
+        typer.echo(json.dumps(result, allow_nan=False))
+    else:
+        progress.claims(result)
 
 
 @app.command()
@@ -151,6 +163,7 @@ def doctor() -> None:
 def list_() -> None:
     """Shipped scenarios, aircraft and papers."""
     from landing_sim import paths, scenario
+    from landing_sim.papers import PAPERS
 
     typer.echo("scenarios")
     for name in paths.scenario_names():
@@ -159,6 +172,8 @@ def list_() -> None:
     for name in paths.aircraft_names():
         typer.echo(f"  {name}")
     typer.echo("papers")
+    for name in PAPERS:
+        typer.echo(f"  {name}")
 
 
 def _load(name: str, changes: list[str]) -> Scenario:

@@ -72,10 +72,9 @@ def _lines() -> Callable[[Step], None]:
 def table(result: dict[str, Any]) -> None:
     """The result of a run: touchdown, every criterion beside its limit and source, files."""
     from rich.box import SIMPLE_HEAD
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console(width=None if sys.stdout.isatty() else 110)
+    console = _console()
     rows = Table(title=f"{result['scenario']}, seed {result['seed']}", title_justify="left", box=SIMPLE_HEAD)
     for heading, justify in (("", "left"), ("ours", "right"), ("limit", "right"), ("", "left"), ("source", "left")):
         rows.add_column(heading, justify=justify)  # type: ignore[arg-type]
@@ -113,3 +112,30 @@ def table(result: dict[str, Any]) -> None:
         console.print(
             "  watch it:  landing-sim replay " + result["files"]["recording"].rsplit("/", 1)[0], soft_wrap=True
         )
+
+
+def claims(result: dict[str, Any]) -> None:
+    """The result of `reproduce`: every claim, the paper's value beside ours."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    rows = Table(title=result["paper"], title_justify="left", box=SIMPLE_HEAD)
+    for heading, justify in (("claim", "left"), ("where", "left"), ("paper", "right"), ("ours", "right"), ("", "left")):
+        rows.add_column(heading, justify=justify)  # type: ignore[arg-type]
+    styles = {"met": "[green]met[/]", "not_met": "[bold red]not met[/]", "not_comparable": "[dim]not comparable[/]"}
+    for claim in result["claims"]:
+        values = ["" if v is None else f"{v:.3g} {claim['unit']}" for v in (claim["paper_value"], claim["our_value"])]
+        rows.add_row(claim["statement"], claim["where"], *values, styles[claim["verdict"]])
+    console = _console()
+    console.print(rows)
+    counts = {verdict: sum(c["verdict"] == verdict for c in result["claims"]) for verdict in styles}
+    console.print(", ".join(f"{n} {verdict.replace('_', ' ')}" for verdict, n in counts.items()), highlight=False)
+    for kind, file in result.get("files", {}).items():
+        console.print(f"  {kind:10} {file}", highlight=False, soft_wrap=True)
+
+
+def _console() -> Any:
+    """Tables keep their columns when they go to a file or a pipe."""
+    from rich.console import Console
+
+    return Console(width=None if sys.stdout.isatty() else 110)
