@@ -200,7 +200,7 @@ class RenderedFrame:
         if self._scene is None:
             r, n = self.renderer, len(self.poses)
             m = len(r.points)
-            lines, seen = np.empty((n, m, 4, 3)), np.empty((n, m, 5), np.int64)
+            lines, seen = np.empty((n, m, 4, 4)), np.empty((n, m, 5), np.int64)
             counts, horizon = np.empty(n, np.int64), np.empty((n, 5))
             for k, (p_RC, R_CR) in enumerate(self.poses):
                 counts[k] = project(r.points, r.material, p_RC, R_CR, r.camera, lines[k], seen[k], horizon[k])

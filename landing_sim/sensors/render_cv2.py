@@ -73,7 +73,7 @@ def _polygons(lines: Array, count: int, horizon: Array, R_CR: Array, camera: Arr
     corners[0] = _polygon(tangents, width, height, out[0])
     quad = np.empty((4, 3))
     for m in range(count):
-        quad[:] = lines[m]
+        quad[:] = lines[m, :, :3]
         quad[:, 2] -= TABLE_HALF
         corners[m + 1] = _polygon(quad, width, height, out[m + 1])
     return corners

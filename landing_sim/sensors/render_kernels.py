@@ -5,9 +5,12 @@ four half-planes {l . (u, v, 1) > 0}, l = K^-T (P_i x P_i+1), wherever its corne
 the camera. Homogeneous clipping is thus exact without a near plane, and no coordinate is ever clamped.
 
 Optics: the indicator of a half-plane blurred by a Gaussian is Phi(d / sigma) of the signed distance d. The two opposite
-edges of a quadrilateral are a slab, Phi(d1) + Phi(d2) - 1, which keeps the contrast of stripes thinner than a pixel; its
-two slabs are multiplied (exact where they are at right angles; elsewhere inexact only within ~2 sigma of a corner).
-Layers are composed bottom up. Lines are stored in table units (TABLE_HALF at the edge, 0 and 2 TABLE_HALF at -+ CUT
+edges of a quadrilateral are a slab, Phi(d1) + Phi(d2) - 1, which keeps the contrast of stripes thinner than a pixel. Two
+slabs at right angles multiply; at other angles the truth is a bivariate normal of correlation n1 . n2, approached between
+its bounds min(P1, P2) and P1 + P2 - 1 with weight 2 asin(n1 . n2) / pi, which is exact at the corner itself, at right
+angles and where edges are parallel. Layers are composed bottom up as if their edges were independent: where edges of
+two layers are less than a pixel apart (far end against horizon) single pixels are off by up to ~8 of 255 grey levels.
+Lines are stored in table units (TABLE_HALF at the edge, 0 and 2 TABLE_HALF at -+ CUT
 sigma), beyond which the profile is exactly 0 or 1: so skipping what cannot matter changes no bit, and windows, tiles
 and single pixels agree whatever is computed with them. For the same reason nothing is drawn more than CUT sigma outside
 the box around a quadrilateral's corners (which also removes the spikes that four profiles leave at sharp corners).
@@ -56,9 +59,11 @@ def project(
     """Project quadrilaterals `points` (m, 4, 3) [m], frame R, into image lines.
 
     camera (6,): f, cx, cy [px], width, height, blur sigma [px].
-    Fills lines (m, 4, 3) in table units, seen (m, 5) the material of each and the first and last column and row that it
-    may touch, horizon (5,): gradient and offset of the
-    z component (frame R) of the ray (x, y, 1) of pixel (u, v), sine of the dip, bound of the gradient.
+    Fills
+        lines (m, 4, 4) in table units; last, the weight of the corner between this edge and the next
+        seen (m, 5) material of each, then the first and last column and row that it may touch
+        horizon (5,) gradient and offset of the z component (frame R) of the ray (x, y, 1) of pixel (u, v), sine of the
+        dip, bound of the gradient of `_dip_function`
     Returns the number of quadrilaterals kept: those in front of the camera, near the image and seen from above.
     """
     f, cx, cy = camera[0], camera[1], camera[2]
@@ -100,6 +105,10 @@ def project(
             lines[count, i, 1] = b * scale
             lines[count, i, 2] = c * scale + TABLE_HALF
         if above:
+            for i in range(4):
+                k = (i + 1) & 3
+                dot = lines[count, i, 0] * lines[count, k, 0] + lines[count, i, 1] * lines[count, k, 1]
+                lines[count, i, 3] = 2.0 / math.pi * math.asin(min(max(dot / (units * units), -1.0), 1.0))
             seen[count, 0] = material[m]
             seen[count, 1] = seen[count, 3] = -FAR
             seen[count, 2] = seen[count, 4] = FAR
@@ -249,7 +258,7 @@ def _draw_quad(
             if least >= TABLE_SIZE + SLACK:
                 continue
             if most <= -SLACK:
-                hi = lo
+                hi, inside_hi = lo, 0
             elif least < -SLACK or most > TABLE_SIZE + SLACK:
                 zero = min(max(-at_lo / a, -2.0), w + 2.0)
                 full = min(max((TABLE_SIZE - at_lo) / a, -3.0), w + 3.0)
@@ -269,9 +278,16 @@ def _draw_quad(
         for _ in range(2):
             for c in range(start, stop):
                 u = u0 + c
-                across = max(0.0, 1.0 - (_beyond(a0 * u + e0, table) + _beyond(a2 * u + e2, table)))
-                along = max(0.0, 1.0 - (_beyond(a1 * u + e1, table) + _beyond(a3 * u + e3, table)))
+                q0, q1 = _beyond(a0 * u + e0, table), _beyond(a1 * u + e1, table)
+                q2, q3 = _beyond(a2 * u + e2, table), _beyond(a3 * u + e3, table)
+                across, along = max(0.0, 1.0 - (q0 + q2)), max(0.0, 1.0 - (q1 + q3))
                 alpha = across * along
+                both = (q0 + q2) * (q1 + q3)
+                if both > 0.0 and alpha > 0.0:
+                    w01, w12, w23, w30 = line[0, 3], line[1, 3], line[2, 3], line[3, 3]
+                    weight = (q0 * (q1 * w01 + q3 * w30) + q2 * (q1 * w12 + q3 * w23)) / both
+                    bound = min(across, along) if weight > 0.0 else max(0.0, across + along - 1.0)
+                    alpha += abs(weight) * (bound - alpha)
                 block[r, c] = alpha * grey + (1.0 - alpha) * block[r, c]
             start, stop = inside_hi, hi
 
