@@ -1,0 +1,192 @@
+"""Acceptance runs: many seeds, the figures that the project promises, result files that are checked in.
+
+usage: tools/accept [NAME ...]     without a name: all, each to tests/acceptance/NAME.json
+
+A result holds the commit, the seeds, the distribution of every metric over the flights (median, 95th percentile of the
+magnitude, largest) and each promise with its verdict. Exit status 1 if a promise is not kept.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+OUT = ROOT / "tests" / "acceptance"
+
+
+@dataclass(frozen=True, slots=True)
+class Promise:
+    """`statistic` ("p95", "p5", "min", "max", "mean", "median", "share") of a metric within [low, high]."""
+
+    metric: str
+    statistic: str
+    low: float = -math.inf
+    high: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Campaign:
+    """The same scenario over many seeds."""
+
+    scenario: str
+    promises: tuple[Promise, ...]
+    seeds: Sequence[int] = range(1, 41)
+    changes: tuple[str, ...] = ()
+
+
+def box(metric: str, low: float, high: float) -> tuple[Promise, Promise]:
+    return Promise(metric, "p5", low), Promise(metric, "p95", -math.inf, high)
+
+
+LANDED = Promise("landed", "share", 1.0)
+WEATHER = (
+    LANDED,
+    Promise("touchdown_y_m", "max", high=3.0),
+    Promise("sink_rate_mps", "max", high=1.5),
+    Promise("touchdown_x_m", "min", low=250.0),
+    Promise("touchdown_x_m", "max", high=900.0),
+)
+GUST = (
+    LANDED,
+    Promise("range_m", "p95", high=5.0),
+    Promise("range_far_percent", "p95", high=2.0),
+    Promise("height_approach_m", "p95", high=0.6),
+    Promise("height_runway_m", "p95", high=0.2),
+    Promise("lateral_m", "p95", high=1.0),
+    Promise("roll_deg", "p95", high=0.3),
+    Promise("yaw_deg", "p95", high=0.3),
+    Promise("captured_after_m", "p95", high=520.0),
+    Promise("peak_roll_deg", "p95", high=10.5),
+    *box("touchdown_x_m", 490.0, 610.0),
+    Promise("touchdown_y_m", "p95", high=0.5),
+    Promise("sink_rate_mps", "p95", high=0.6),
+    *box("touchdown_airspeed_mps", 41.5, 44.5),
+)
+WIDTH = (LANDED, Promise("width_at_loss_m", "max", high=1.0), Promise("width_mean_m", "mean", high=0.4))
+CONSISTENT = (Promise("nees", "mean", 0.5, 2.0), Promise("nis", "mean", 0.7, 1.3))
+
+CAMPAIGNS: dict[str, Campaign] = {
+    "gust": Campaign("do128/gust", GUST),
+    "calm": Campaign("do128/calm", WEATHER),
+    "gust_light": Campaign("do128/gust_light", WEATHER),
+    "gust_moderate": Campaign("do128/gust_moderate", WEATHER),
+    "headwind": Campaign("do128/headwind", WEATHER),
+    "tailwind": Campaign("do128/tailwind", WEATHER),
+    "consistency": Campaign("do128/gust", CONSISTENT, range(1001, 1061)),
+    "plain": Campaign("do128/gust", (LANDED,), changes=("filter.kind=plain",)),
+    "split": Campaign("do128/gust", (LANDED,), changes=("filter.kind=split", "filter.factorisation=ud")),
+    "width_25": Campaign(
+        "do128/calm", WIDTH, range(1, 21), ("filter.width=state", "filter.believed_width_m=25")
+    ),
+    "width_33": Campaign(
+        "do128/calm", WIDTH, range(1, 21), ("filter.width=state", "filter.believed_width_m=33")
+    ),
+}  # fmt: skip
+
+
+def fly(job: tuple[str, tuple[str, ...], int]) -> dict[str, float]:
+    """Metrics of one flight."""
+    from landing_sim import runner, scenario, vehicle
+    from landing_sim.record import judge
+
+    name, changes, seed = job
+    wanted = scenario.load(name, [*changes, f"seed={seed}"])
+    flight = runner.fly(wanted, vehicle.load(wanted.aircraft.model))
+    metrics = dict(flight.verdict.metrics)
+    metrics["landed"] = float(flight.verdict.outcome == "landed")
+    log = flight.log
+    if "est_W_m" in log:
+        seen = judge.threshold_in_view(log) & log["valid"]
+        far = seen & (log["true_x_m"] > -600.0)
+        error = log.error("W")
+        metrics["width_at_loss_m"] = float(abs(error[seen][-1]))
+        metrics["width_mean_m"] = float(abs(np.mean(error[far])))
+    return metrics
+
+
+def statistic(values: np.ndarray, name: str) -> float:
+    magnitude = np.abs(values)
+    match name:
+        case "p95":
+            return float(np.percentile(magnitude, 95.0))
+        case "p5":
+            return float(np.percentile(magnitude, 5.0))
+        case "min":
+            return float(magnitude.min())
+        case "max":
+            return float(magnitude.max())
+        case "median":
+            return float(np.median(magnitude))
+        case "mean" | "share":
+            return float(values.mean())
+    raise ValueError(name)
+
+
+def run(name: str, pool: ProcessPoolExecutor) -> bool:
+    campaign = CAMPAIGNS[name]
+    jobs = [(campaign.scenario, campaign.changes, seed) for seed in campaign.seeds]
+    flights = list(pool.map(fly, jobs))
+    columns = {key: np.array([f[key] for f in flights]) for key in flights[0]}
+    kept = []
+    for p in campaign.promises:
+        value = statistic(columns[p.metric], p.statistic)
+        kept.append({"metric": p.metric, "statistic": p.statistic, "low": finite(p.low), "high": finite(p.high),
+                     "value": finite(value), "kept": bool(p.low <= value <= p.high)})  # fmt: skip
+    result: dict[str, Any] = {
+        "name": name,
+        "scenario": campaign.scenario,
+        "changes": list(campaign.changes),
+        "seeds": [campaign.seeds[0], campaign.seeds[-1]],
+        "flights": len(flights),
+        "commit": commit(),
+        "promises": kept,
+        "metrics": {
+            key: {s: finite(statistic(values, s)) for s in ("median", "p95", "max")}
+            for key, values in columns.items()
+            if np.isfinite(values).all()
+        },
+    }
+    OUT.mkdir(exist_ok=True)
+    (OUT / f"{name}.json").write_text(json.dumps(result, indent=1) + "\n")
+    print(f"\n{name}: {len(flights)} flights of {campaign.scenario} {' '.join(campaign.changes)}")
+    for k in kept:
+        bounds = f"[{'' if k['low'] is None else k['low']} .. {'' if k['high'] is None else k['high']}]"
+        print(f"  {'kept  ' if k['kept'] else 'BROKEN'} {k['metric']:24s} {k['statistic']:6s} {k['value']!s:22.8} {bounds}")
+    return all(k["kept"] for k in kept)
+
+
+def finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def commit() -> str:
+    head = subprocess.run(["git", "rev-parse", "--short=12", "HEAD"], cwd=ROOT, capture_output=True, text=True)
+    changed = subprocess.run(
+        ["git", "status", "--porcelain", "landing_sim", "aircraft", "scenarios"],
+        cwd=ROOT, capture_output=True, text=True,
+    )  # fmt: skip
+    return head.stdout.strip() + ("+changes" if changed.stdout.strip() else "")
+
+
+def main(names: Sequence[str]) -> int:
+    unknown = [name for name in names if name not in CAMPAIGNS]
+    if unknown:
+        print(f"no acceptance run called {', '.join(unknown)}; there are: {', '.join(CAMPAIGNS)}", file=sys.stderr)
+        return 2
+    with ProcessPoolExecutor(2) as pool:
+        kept = [run(name, pool) for name in names or CAMPAIGNS]
+    return 0 if all(kept) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
