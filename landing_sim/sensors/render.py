@@ -138,17 +138,15 @@ class RenderedFrame:
 
     def windows(self, corners: np.ndarray, width: int, height: int) -> np.ndarray:
         """(n, height, width) uint8 for n corners (n, 2) int64 [u0, v0]; ValueError if one leaves the frame."""
-        r, n = self.renderer, len(corners)
-        inside = True
-        if r.optics.renderer == "exact":
-            out = np.empty((n * height, width), np.uint8)
-            inside = self._shade(out, corners, width, height, NOTHING)
-            out = out.reshape(n, height, width)
+        n = len(corners)
+        if self.renderer.optics.renderer == "exact":
+            flat = np.empty((n * height, width), np.uint8)
+            inside = self._shade(flat, corners, width, height, NOTHING)
+            out = flat.reshape(n, height, width)
         else:
             image = np.lib.stride_tricks.sliding_window_view(self.full(), (height, width))
-            last_v, last_u = image.shape[:2]
             u, v = corners.T
-            inside = bool(np.all((u >= 0) & (v >= 0) & (u < last_u) & (v < last_v)))
+            inside = bool(np.all((u >= 0) & (v >= 0) & (u < image.shape[1]) & (v < image.shape[0])))
             out = image[v, u] if inside else image[:0, 0]
         if not inside:
             frame = f"{self.width}x{self.height}"
