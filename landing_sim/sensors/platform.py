@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from landing_sim.jit import kernel
 from landing_sim.types import Array
 
 
@@ -61,8 +62,8 @@ class PanTilt:
             raise ValueError(
                 f"platform limits must lie in 0..pi (pan) and 0..80 deg (tilt), got {pan_limit}, {tilt_limit}"
             )
-        self._lag, self._rate_limit, self._stabilisation = lag, rate_limit, stabilisation
-        self.pan_limit, self.tilt_limit = pan_limit, tilt_limit
+        self._lag, self._rate_limit, self._stabilisation = float(lag), float(rate_limit), float(stabilisation)
+        self.pan_limit, self.tilt_limit = float(pan_limit), float(tilt_limit)
         self.reset(pan, tilt)
 
     def reset(self, pan: float, tilt: float) -> None:
@@ -71,8 +72,8 @@ class PanTilt:
             raise ValueError(
                 f"platform cannot stand at pan {pan}, tilt {tilt} rad: limits {self.pan_limit}, {self.tilt_limit}"
             )
-        self.pan = self.pan_cmd = pan
-        self.tilt = self.tilt_cmd = tilt
+        self.pan = self.pan_cmd = float(pan)
+        self.tilt = self.tilt_cmd = float(tilt)
         self.pan_rate = self.tilt_rate = 0.0  # [rad/s] relative to the body
 
     def step(self, pan_cmd: float, tilt_cmd: float, w_RB_B: Array, dt: float) -> None:
@@ -81,16 +82,24 @@ class PanTilt:
         Commands beyond the limits are held at the limit by the mount, as is the mount itself.
         """
         self.pan_cmd, self.tilt_cmd = pan_cmd, tilt_cmd
-        p, q, r = w_RB_B.tolist()
-        pan, tilt, k, most = self.pan, self.tilt, self._stabilisation, self._rate_limit
-        # Exact for a command constant over dt, so that the lag does not depend on the step.
-        follow = -math.expm1(-dt / self._lag) / dt if self._lag > 0.0 else 1.0 / dt
-        ca, sa = math.cos(pan), math.sin(pan)
-        limit_p, limit_t = self.pan_limit, self.tilt_limit
-        wanted_pan = min(max(pan_cmd, -limit_p), limit_p)
-        wanted_tilt = min(max(tilt_cmd, -limit_t), limit_t)
-        pan_rate = (wanted_pan - pan) * follow - k * (r + math.tan(tilt) * (p * ca + q * sa))
-        tilt_rate = (wanted_tilt - tilt) * follow - k * (q * ca - p * sa)
-        self.pan = min(max(pan + min(max(pan_rate, -most), most) * dt, -limit_p), limit_p)
-        self.tilt = min(max(tilt + min(max(tilt_rate, -most), most) * dt, -limit_t), limit_t)
-        self.pan_rate, self.tilt_rate = (self.pan - pan) / dt, (self.tilt - tilt) / dt
+        self.pan, self.tilt, self.pan_rate, self.tilt_rate = _advance(
+            self.pan, self.tilt, pan_cmd, tilt_cmd, w_RB_B, dt,
+            self._lag, self._rate_limit, self._stabilisation, self.pan_limit, self.tilt_limit,
+        )  # fmt: skip
+
+
+@kernel
+def _advance(
+    pan: float, tilt: float, pan_cmd: float, tilt_cmd: float, w: Array, dt: float,
+    lag: float, most: float, k: float, pan_limit: float, tilt_limit: float,
+) -> tuple[float, float, float, float]:  # fmt: skip
+    # Exact for a command constant over dt, so that the lag does not depend on the step.
+    follow = -math.expm1(-dt / lag) / dt if lag > 0.0 else 1.0 / dt
+    ca, sa = math.cos(pan), math.sin(pan)
+    wanted_pan = min(max(pan_cmd, -pan_limit), pan_limit)
+    wanted_tilt = min(max(tilt_cmd, -tilt_limit), tilt_limit)
+    pan_rate = (wanted_pan - pan) * follow - k * (w[2] + math.tan(tilt) * (w[0] * ca + w[1] * sa))
+    tilt_rate = (wanted_tilt - tilt) * follow - k * (w[1] * ca - w[0] * sa)
+    new_pan = min(max(pan + min(max(pan_rate, -most), most) * dt, -pan_limit), pan_limit)
+    new_tilt = min(max(tilt + min(max(tilt_rate, -most), most) * dt, -tilt_limit), tilt_limit)
+    return new_pan, new_tilt, (new_pan - pan) / dt, (new_tilt - tilt) / dt
