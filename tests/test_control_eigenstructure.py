@@ -172,3 +172,11 @@ def test_unstable_wish_is_refused() -> None:
         follow(A, B, K_d, R, Q0, R, 0.0)
     with pytest.raises(DesignError, match="rho"):
         follow(A, B, K_d, R, Q0, R, -1.0)
+
+
+def test_shape_tells_apart_what_eigenvalues_do_not() -> None:
+    """x decays with -1.2 and y with -1.0; the mode wanted at -1.05 is the one of x."""
+    loop = np.diag([-1.2, -1.0])
+    modes = (Mode("x", -1.05, {"x": 1.0, "y": 0.0}), Mode("y", -1.15, {"x": 0.0, "y": 1.0}))
+    found = achieved(loop, np.eye(2), np.zeros((2, 2)), modes, ("x", "y"), np.ones(2))
+    assert [(m.name, m.eigenvalue, m.shape_error) for m in found] == [("x", -1.2, 0.0), ("y", -1.0, 0.0)]

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from landing_sim.control.believed import believed, motion
 from landing_sim.control.guidance import Capture, GuidanceMemory, LandingGuidance, Path
 from landing_sim.control.pointing import look_along
 from landing_sim.control.settings import (
@@ -252,6 +253,21 @@ def test_wind_need_not_be_estimated() -> None:
     e = on_path(guidance, 0.0, -400.0)
     plain = Estimate(0.0, NAMES[:12], e.mean[:12], None, True)
     assert guidance.step(GuidanceMemory("glide"), plain)[1] == guidance.step(GuidanceMemory("glide"), e)[1]
+
+
+# --------------------------------------------------------------------------------------------------- kinematics
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(-0.5, 0.5), min_size=3, max_size=3), st.lists(st.floats(-9.0, 9.0), min_size=6, max_size=6))
+def test_motion_is_rotation_and_wind(angles: list[float], values: list[float]) -> None:
+    velocity, wind = np.array(values[:3]) + [50.0, 0.0, 0.0], np.array(values[3:])
+    state = dict(zip(("phi", "theta", "psi", "u", "v", "w", "wx", "wy", "wz"), [*angles, *velocity, *wind]))
+    m = motion(believed(estimate(**state)))
+    R_RB = so3.from_euler(*angles)
+    air = velocity - R_RB.T @ wind
+    np.testing.assert_allclose([m.x_dot, m.y_dot, -m.H_dot], R_RB @ velocity, atol=1e-12)
+    np.testing.assert_allclose([m.u_air, m.v_air, m.w_air, m.airspeed], [*air, np.linalg.norm(air)], atol=1e-12)
 
 
 # --------------------------------------------------------------------------------------------------- pointing

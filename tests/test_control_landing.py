@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 
 from landing_sim import paths, vehicle
+from landing_sim.control.believed import believed, motion
 from landing_sim.control.design import Design, DesignError, LinearModel, design, design_dict, design_report
 from landing_sim.control.guidance import LandingGuidance
 from landing_sim.control.landing_lq import LandingController, ThrustMap
+from landing_sim.control.rollout import Rollout, RolloutMemory
 from landing_sim.control.settings import RolloutSettings
 from landing_sim.geometry.earth import RunwayFrame
 from landing_sim.noise import Noise
@@ -152,6 +154,66 @@ def test_a_gust_that_heading_is_not_corrected_for_is_not_taken_for_sideslip() ->
     assert abs(command(e, r).aileron) > 0.2  # told nothing, it must believe that it slips by 3 m/s
 
 
+def test_decrabbed_flight_is_a_steady_sideslip() -> None:
+    """Wing low by just as much as the slip takes: neither roll, yaw nor side acceleration, on the aircraft's own model."""
+    _, result = do128()
+    m = result.points[0].model
+    slip = 2.0
+    phi = result.points[0].sideslip[0] * slip
+    e, r = in_trim(v=slip, phi=phi)
+    c = command(e, replace(r, extra={"sideslip": slip / math.hypot(*m.state[:3]), "crosswind": 0.0}))
+    x = np.zeros(12)
+    x[1], x[6] = slip, phi
+    rates = m.A @ x + m.B @ [0.0, 0.0, c.aileron, c.rudder]
+    assert 0.01 < phi < 0.1  # right wing down, into the air from the right
+    np.testing.assert_allclose(rates[[1, 3, 5]], 0.0, atol=3e-3)
+
+
+def test_steady_turn_and_pull_are_fed_forward() -> None:
+    """At the rates and attitudes asked for, the command balances the linear model's moments without any feedback."""
+    _, result = do128()
+    point = result.points[0]
+    m = point.model
+    r = 0.02
+    phi = -float(np.linalg.solve(np.hstack([m.A[np.ix_([1, 3, 5], [6])], m.B[np.ix_([1, 3, 5], [2, 3])]]),
+                                 m.A[[1, 3, 5], 5])[0]) * r  # fmt: skip
+    e, ref = in_trim(r=r, phi=phi)
+    c = command(e, replace(ref, phi=phi, r_ff=r))
+    x = np.zeros(12)
+    x[5], x[6] = r, phi
+    np.testing.assert_allclose((m.A @ x + m.B @ [0.0, 0.0, c.aileron, c.rudder])[[1, 3, 5]], 0.0, atol=1e-9)
+    assert phi == pytest.approx(m.airspeed * r / 9.81, rel=0.05)
+
+    q = 0.03
+    w = point.pull[0] * q
+    e, ref = in_trim(q=q, w=m.state[2] + w, theta=m.state[7] + w / m.airspeed)
+    c = command(e, replace(ref, extra={"pull": q * math.hypot(m.airspeed, w)}))
+    x = np.zeros(12)
+    x[2], x[4] = w, q
+    np.testing.assert_allclose((m.A @ x + m.B @ [c.elevator - m.inputs[0], 0.0, 0.0, 0.0])[[2, 4]], 0.0, atol=5e-3)
+    assert w > 0.0 > c.elevator - m.inputs[0]
+
+
+def test_on_the_wheels_everything_is_steered_back() -> None:
+    v, _ = do128()
+    rollout = Rollout(v.control.rollout)
+    ref = Reference("rollout", 0.0, 1.8, 0.0, 0.0, 0.0, 0.0)
+
+    def step(**values: float) -> tuple[float, float, float, float, float]:
+        b = believed(Estimate(0.0, NAMES, np.array([{"u": 30.0, **values}.get(n, 0.0) for n in NAMES]), None, True))
+        return rollout.step(RolloutMemory(), b, motion(b), ref, 0.06)[1]
+
+    straight = step()
+    assert straight[3] == straight[4]
+    elevator, aileron, rudder, left, right = step(theta=0.1, phi=0.05, psi=0.05, y=1.0)
+    assert elevator > straight[0]  # nose high: push
+    assert aileron < 0.0  # right wing low: raise it
+    assert rudder > 0.0  # to the right and pointing there: nose left
+    assert left > right
+    assert step(psi=0.05, u=15.0)[2] > rudder  # less air, more rudder
+    assert step(r=0.05)[2] > 0.0
+
+
 def test_updraught_lowers_the_nose() -> None:
     """In air rising at 1 m/s the same path needs 1/50 rad less pitch; flown so, the elevator stays in trim."""
     _, result = do128()
@@ -214,6 +276,8 @@ def test_settings_name_what_is_wrong() -> None:
         replace(v.control.rollout, brake=(0.1,))
     with pytest.raises(ValueError, match="increasing"):
         replace(v.control.thrust, airspeed_mps=(0.0, 30.0, 20.0, 40.0, 50.0, 60.0, 80.0))
+    with pytest.raises(ValueError, match="full_n must exceed idle_n"):
+        replace(v.control.thrust, idle_n=v.control.thrust.full_n)
     assert isinstance(v.control.rollout, RolloutSettings)
 
 
