@@ -15,14 +15,14 @@ import numpy as np
 
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.sensors import render_cv2
-from landing_sim.sensors.render_kernels import TILE, develop_frame, edge_table, project, shade
+from landing_sim.sensors.render_kernels import TILE, edge_table, project, shade
+from landing_sim.sensors.render_noise import develop_frame, gaussian_quantiles
 from landing_sim.signals import CameraTruth
 from landing_sim.types import Array
 from landing_sim.world.runway import GRASS, SKY, Runway
 
 RENDERERS = ("exact", "line_aa", "line_8")
 SUB_EXPOSURES = 4  # instants averaged into one frame when the shutter is not instantaneous
-QUANTILES = 65536
 NOTHING = np.empty((0, 0), np.uint8)
 
 
@@ -52,14 +52,6 @@ class Optics:
 @cache
 def _edge_table() -> Array:
     return edge_table()
-
-
-@cache
-def gaussian_quantiles() -> np.ndarray:
-    """(65536,) float32: standard normal quantiles at the middle of each of as many equal probabilities."""
-    from scipy.special import ndtri
-
-    return ndtri((np.arange(QUANTILES) + 0.5) / QUANTILES).astype(np.float32)  # type: ignore[no-any-return]
 
 
 class Renderer:
