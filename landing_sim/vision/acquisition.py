@@ -22,6 +22,7 @@ from landing_sim.signals import CameraSample, Feature, Status
 from landing_sim.types import Array
 from landing_sim.vision.believed import BelievedCamera, RunwayMap
 from landing_sim.vision.hough import borders, depth_profile, edge_points, horizon_line
+from landing_sim.vision.placement import clean_strips
 from landing_sim.vision.prediction import camera_pose
 from landing_sim.vision.windows import EdgeConfig, SearchConfig, WindowPlanner
 
@@ -158,7 +159,8 @@ class Acquisition:
         slope, f = self._runway.slope, self._lens[0]
         cs, ss = math.cos(slope), math.sin(slope)
         R_CD = R_RC.T @ np.array([[cs, 0.0, ss], [0.0, 1.0, 0.0], [-ss, 0.0, cs]])  # D: along, right, down normal
-        strips = self._runway.clean_strips()
+        stripes = self._runway.stripes
+        strips = clean_strips(self._runway.width, stripes.outermost, stripes.gap)
         offsets = np.concatenate([s[0] + (s[1] - s[0]) * np.linspace(0.25, 0.75, 5) for s in strips]) - y
         scale = height * f  # pixels below the horizon, times metres
         nearest = 1.0 / max(10.0, 2.0 * height)
@@ -183,23 +185,24 @@ class Acquisition:
 
     def _fine(self, sample: CameraSample, pose: Array, pan: float, tilt: float) -> Acquired:
         """Gauss-Newton with Huber weights on windows placed along the predicted lines, search narrowing."""
-        cov, nothing = np.zeros((6, 6)), np.empty(0)
+        platform = np.array([pan, tilt, self._runway.width])
+        cov, nothing = np.zeros((9, 9)), np.empty(0)
         r, J = nothing, nothing
         for planner in (*self._planners, self._planners[-1]):
-            w = planner.place(pose, cov, pan, tilt, self._counts)
+            w = planner.place(np.concatenate([pose, platform]), cov, self._counts)
             z, variance, contrast, status = planner.measure(sample.frame, w)
             weak = contrast < 3.7 * self._camera.noise / np.sqrt(2.0 * w.half + 1.0)  # 4.5 sigma
             ok = (status == Status.FOUND) & ~(weak & (w.feature == Feature.THRESHOLD))
             seen = _Seen(w.feature[ok], w.centre[ok], w.direction[ok], z[ok], variance[ok], contrast[ok])
             if not np.any(seen.feature == Feature.THRESHOLD):
-                seen = self._with_threshold(sample, seen, pose, pan, tilt)
+                seen = self._with_threshold(sample, seen, np.concatenate([pose, platform]))
             for name in Feature:
                 if np.count_nonzero(seen.feature == name) < (1 if name == Feature.THRESHOLD else 2):
                     return Acquired(None, None, f"too few windows found on the {name.name.lower()} edge")
             sigma = np.sqrt(seen.variance)
             for _ in range(3):
-                h, J = planner.predict(seen.feature, seen.centre, seen.direction, pose, pan, tilt)
-                r, J = (seen.z - h) / sigma, J / sigma[:, None]
+                h, J = planner.predict(seen.feature, seen.centre, seen.direction, np.concatenate([pose, platform]))
+                r, J = (seen.z - h) / sigma, J[:, :6] / sigma[:, None]
                 limit = 2.0 * max(1.0, float(np.median(np.abs(r))))
                 weight = np.minimum(1.0, limit / np.maximum(np.abs(r), 1e-9))
                 try:
@@ -215,7 +218,7 @@ class Acquisition:
         )
         if max(left, right, near) > self._config.max_contrast_ratio * min(left, right, near):
             return Acquired(None, None, f"edges of different contrast: {left:.0f}, {right:.0f}, threshold {near:.0f}")
-        h, _ = planner.predict(seen.feature, seen.centre, seen.direction, pose, pan, tilt)
+        h, _ = planner.predict(seen.feature, seen.centre, seen.direction, np.concatenate([pose, platform]))
         r = (seen.z - h) / sigma
         spread = float(np.sqrt(np.mean(np.minimum(r * r, 25.0))))
         if spread > self._config.max_residual:
@@ -223,9 +226,9 @@ class Acquisition:
         R = np.linalg.inv(J.T @ J) * max(1.0, spread) ** 2 + self._encoder_covariance(pose, pan, tilt)
         return Acquired(pose, 0.5 * (R + R.T))
 
-    def _with_threshold(self, sample: CameraSample, seen: _Seen, pose: Array, pan: float, tilt: float) -> _Seen:
+    def _with_threshold(self, sample: CameraSample, seen: _Seen, sight: Array) -> _Seen:
         """Where the threshold is too faint for single windows: its place in the mean of all clean strips instead."""
-        p_RC, R_CR = camera_pose(pose, np.array(self._camera.p_BC), pan, tilt)
+        p_RC, R_CR = camera_pose(sight, np.array(self._camera.p_BC))
         slope = self._runway.slope
         height = -p_RC[2] * math.cos(slope) - p_RC[0] * math.sin(slope)
         found = self._threshold(sample.frame.full(), R_CR.T, height, p_RC[1])

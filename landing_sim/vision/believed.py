@@ -90,19 +90,8 @@ class RunwayMap:
                 f"runway ({self.width} m); use fewer stripes"
             )
 
-    def clean_strips(self) -> Array:
-        """(k, 2) [m] y0, y1: lateral intervals where no stripe follows the threshold, the outer ones first.
-
-        With 6 stripes on 29 m: 3.7 m at each side, 3.6 m at the centre. Elsewhere the stripe's own edge, 6 m in, is only
-        0.7 px behind the threshold's at 950 m and would pull a window's measurement inwards.
-        """
-        half, outer = 0.5 * self.width, self.stripes.outermost
-        if outer == 0.0:
-            return np.array([[-half, 0.0], [0.0, half]])
-        return np.array([[-half, -outer], [outer, half], [-self.stripes.gap, self.stripes.gap]])
-
     def border_paint(self) -> Array:
-        """(m, 4) x0, x1 [m], Feature, clear distance [m] from that borderline inwards to the paint."""
+        """(m, 4) x0, x1 [m], Feature, |y| [m] to which paint reaches on that side."""
         half, rows = 0.5 * self.width, []
         boxes = list(self.paint)
         if self.stripes.count:
@@ -111,10 +100,9 @@ class RunwayMap:
             far = self.length - s.start
             boxes.append((far - s.length, far, -s.outermost, s.outermost))
         for x0, x1, y0, y1 in boxes:
-            if min(y0 + half, half - y1) > 0.8 * half:
-                continue  # the centre line is in nobody's way
-            rows.append((x0, x1, float(Feature.LEFT), y0 + half))
-            rows.append((x0, x1, float(Feature.RIGHT), half - y1))
+            if max(-y0, y1) > 0.2 * half:  # the centre line is in nobody's way
+                rows.append((x0, x1, float(Feature.LEFT), -y0))
+                rows.append((x0, x1, float(Feature.RIGHT), y1))
         return np.array(rows, dtype=float).reshape(-1, 4)
 
     def mouth_rows(self) -> Array:

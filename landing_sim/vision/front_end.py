@@ -11,9 +11,8 @@ from landing_sim.signals import CameraSample, EdgeSet, Estimate, Measurement, Sa
 from landing_sim.types import Array
 from landing_sim.vision.acquisition import Acquisition, AcquisitionConfig
 from landing_sim.vision.believed import BelievedCamera, RunwayMap
+from landing_sim.vision.prediction import PAN, SIGHT, TILT, WIDTH
 from landing_sim.vision.windows import EdgeConfig, Scheme, SearchConfig, WindowPlanner
-
-POSE = ("x", "y", "H", "phi", "theta", "psi")
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,16 +43,8 @@ class RunwayFrontEnd:
     """
 
     __slots__ = (
-        "_acquisition",
-        "_columns",
-        "_counts",
-        "_encoder",
-        "_names",
-        "_planner",
-        "_unknown",
-        "reason",
-        "sensor",
-    )
+        "_acquisition", "_counts", "_encoder", "_names", "_planner", "_sight_of", "_unknown", "_width", "reason", "sensor",
+    )  # fmt: skip
 
     def __init__(self, runway: RunwayMap, camera: BelievedCamera, config: FrontEndConfig | None = None) -> None:
         config = config or FrontEndConfig()
@@ -63,9 +54,10 @@ class RunwayFrontEnd:
         self._acquisition = Acquisition(runway, camera, config.acquisition, config.edges)
         self._counts = Scheme.parse(config.scheme).counts
         self._encoder = config.platform_angle == "encoder"
-        self._unknown: Array = np.diag([10.0, 2.0, 1.0, 0.01, 0.01, 0.01]) ** 2  # for an estimator without covariance
+        self._width = runway.width
+        self._unknown: Array = np.diag([10.0, 2.0, 1.0, 0.01, 0.01, 0.01, 0.0, 0.0, 0.0]) ** 2  # without covariance
         self._names: tuple[str, ...] = ()
-        self._columns = np.empty(0, dtype=np.int64)
+        self._sight_of: Array = np.empty((9, 0))
 
     def process(self, sample: Sample, estimate: Estimate) -> tuple[Measurement, ...]:
         """`estimate` at sample.t_valid. Raises ValueError for an estimate that lacks one of x, y, H, phi, theta, psi."""
@@ -78,16 +70,36 @@ class RunwayFrontEnd:
                 return ()
             return (Measurement("pose", sample.t_valid, sample.t_arrival, got.z, got.R),)
         if estimate.names is not self._names:
-            missing = [name for name in POSE if name not in estimate.names]
-            if missing:
-                raise ValueError(
-                    f"camera front end: the estimate lacks {', '.join(missing)}; it needs {', '.join(POSE)}"
-                )
-            self._names = estimate.names
-            self._columns = np.array([estimate.names.index(name) for name in POSE])
-        cols = self._columns
-        cov = self._unknown if estimate.cov is None else estimate.cov[cols[:, None], cols]
-        w = self._planner.place(estimate.mean[cols], cov, pan, tilt, self._counts)
+            self._names, self._sight_of = estimate.names, sight_of(estimate.names)
+        T = self._sight_of
+        sight = T @ estimate.mean
+        sight[PAN] += pan
+        sight[TILT] += tilt
+        if sight[WIDTH] == 0.0:  # not among what is estimated
+            sight[WIDTH] = self._width
+        cov = self._unknown if estimate.cov is None else T @ estimate.cov @ T.T
+        w = self._planner.place(sight, cov, self._counts)
         z, variance, _, status = self._planner.measure(data.frame, w)
         edges = EdgeSet(w.feature, w.centre, w.direction, status, pan, tilt)
         return (Measurement("edges", sample.t_valid, sample.t_arrival, z, variance, edges),)
+
+
+def sight_of(names: tuple[str, ...]) -> Array:
+    """(9, n) that maps an estimate's states to the sight, less the platform angles read.
+
+    What is read is the true angle plus bias ("epan", "etilt") plus noise ("jpan", "jtilt"), if these are estimated.
+    Raises ValueError if one of x, y, H, phi, theta, psi is not among the names.
+    """
+    missing = [name for name in SIGHT[:PAN] if name not in names]
+    if missing:
+        raise ValueError(
+            f"camera front end: the estimate lacks {', '.join(missing)}; it needs {', '.join(SIGHT[:PAN])}"
+        )
+    T = np.zeros((len(SIGHT), len(names)))
+    for row, name in enumerate(SIGHT):
+        if name in names:
+            T[row, names.index(name)] = 1.0
+    for row, name in ((PAN, "epan"), (PAN, "jpan"), (TILT, "etilt"), (TILT, "jtilt")):
+        if name in names:
+            T[row, names.index(name)] = -1.0
+    return T

@@ -78,9 +78,9 @@ def _put(
 def _footprint(
     view: View, side: int, u: float, v: float, su: float, sv: float, au: float, av: float, half: int, reach: float
 ) -> tuple[float, float, float]:
-    """s0, s1, depth [m]: the stretch of runway a mask at (u, v) sees, and how far it looks inwards of the borderline."""
+    """s0, s1, y [m]: the stretch of runway a mask at (u, v) sees, and the |y| to which it looks inwards."""
     s0, s1, depth = math.inf, -math.inf, 0.0
-    border = (side - 0.5) * view.runway[0]
+    border = (side - 0.5) * view.width
     for i in range(4):
         a, r = (half + 0.5) * (1 if i % 2 else -1), reach if i // 2 else 0.0
         x, y = u + a * au + r * su, v + a * av + r * sv
@@ -89,14 +89,14 @@ def _footprint(
         s = (g[0, 0] * x + g[0, 1] * y + g[0, 2]) / w
         s0, s1 = min(s0, s), max(s1, s)
         depth = max(depth, ((g[1, 0] * x + g[1, 1] * y + g[1, 2]) / w - border) * (1.0 if side == LEFT else -1.0))
-    return s0, s1, depth
+    return s0, s1, 0.5 * view.width - depth
 
 
 @kernel
-def _blocked(rows: Array, side: int, s0: float, s1: float, depth: float) -> bool:
-    """Whether a footprint meets one of the rows x0, x1, Feature, clear distance."""
+def _blocked(rows: Array, side: int, s0: float, s1: float, y: float) -> bool:
+    """Whether a footprint meets one of the rows x0, x1, Feature, |y|: it reaches inwards to |y| = `y`."""
     for k in range(len(rows)):  # noqa: SIM110 a generator cannot be compiled
-        if rows[k, 2] == side and s1 > rows[k, 0] and s0 < rows[k, 1] and depth > rows[k, 3]:
+        if rows[k, 2] == side and s1 > rows[k, 0] and s0 < rows[k, 1] and y < rows[k, 3]:
             return True
     return False
 
@@ -122,12 +122,12 @@ def _place_border(
     """
     for i in range(at, at + n):
         I[i, FEATURE], I[i, STATUS] = side, _OUT
-    l, length, half = view.lines[side], view.runway[1], int(rule[MASK]) // 2
+    l, length, half = view.lines[side], view.length, int(rule[MASK]) // 2
     su, sv, au, av, advance = _path(l, 0.0, 0.0)
     wanted = _range(rule, sigma, advance)
     mu = (wanted + REACH) * abs(su) + half * abs(au) + 2.0
     mv = (wanted + REACH) * abs(sv) + half * abs(av) + 2.0
-    q0, qd = view.threshold + (side - 0.5) * view.runway[0] * view.across, view.along
+    q0, qd = view.threshold + (side - 0.5) * view.width * view.across, view.along
     lo, hi = in_image(q0, qd, 0.0, length, mu, mv, view.frame)
     if lo >= hi:
         return
@@ -172,14 +172,30 @@ def _place_border(
                 continue
             _put(F, I, at + i, u, v, su, sv, au, av, advance, h, search)
             s0, s1, deep = _footprint(view, side, u, v, su, sv, au, av, h, 0.0)
-            if _blocked(mouths, side, s0, s1, 0.0):
+            if _blocked(mouths, side, s0, s1, -math.inf):
                 I[at + i, STATUS] = _MAPPED
             break
 
 
 @kernel
+def clean_strips(width: float, outer: float, inner: float) -> Array:
+    """(k, 2) [m] y0, y1: where no paint follows the threshold, the outer ones first.
+
+    outer, inner [m]: |y| of the outermost and innermost side of the stripes, 0 without any. With 6 stripes on 29 m: 3.7 m
+    at each side, 3.6 m at the centre. Elsewhere the stripe's own edge, 6 m in, is only 0.7 px behind the threshold's at
+    950 m and would pull a measurement inwards.
+    """
+    half = 0.5 * width
+    if outer <= 0.0:
+        return np.array([[-half, 0.0], [0.0, half]])
+    if outer >= half - 0.5:
+        return np.array([[-inner, inner]])
+    return np.array([[-half, -outer], [outer, half], [-inner, inner]])
+
+
+@kernel
 def _place_threshold(
-    F: Array, I: np.ndarray, at: int, n: int, view: View, sigma: float, rule: Array, strips: Array
+    F: Array, I: np.ndarray, at: int, n: int, view: View, sigma: float, rule: Array, stripes: Array
 ) -> int:
     """n windows in rows at.. on the strips of the threshold that no paint follows; returns how many are in view.
 
@@ -197,6 +213,7 @@ def _place_threshold(
         su, sv, au, av, advance = _path(row, 0.0, 0.0)
     search = _range(rule, sigma, advance)
     blurred = 2.0 * _BESIDE * math.hypot(su, sv) / abs(su * av - sv * au)
+    strips = clean_strips(view.width, stripes[0], stripes[1])
     n_strips, n_usable = len(strips), 0
     ends, room = np.empty((n_strips, 4)), np.empty(n_strips)
     for attempt in range(2):  # far off and from the side no strip has room for the full distance: then half of it
@@ -228,7 +245,7 @@ def _place_threshold(
                 _put(F, I, at + seen, u, v, su, sv, au, av, advance, half, search)
                 seen += 1
     if n_usable == 0:
-        reach = 0.5 * view.runway[0]
+        reach = 0.5 * view.width
         lo, hi = in_image(q, view.across, -reach, reach, 0.0, 0.0, view.frame)
         if lo < hi:
             for i in range(at, at + n):
@@ -267,7 +284,9 @@ def _place_horizon(F: Array, I: np.ndarray, at: int, n: int, view: View, sigma: 
                 continue
             l = sky
             for _ in range(4):  # the horizon's line turns with the azimuth it is looked at
-                l = oriented(feature_line(HORIZON, view.p_RC, view.R_CR, view.lens, view.runway, u, v), view.up)
+                l = oriented(
+                    feature_line(HORIZON, view.p_RC, view.R_CR, view.lens, view.width, view.slope, u, v), view.up
+                )
                 u, v = _on_line(l, u, v)
             su, sv, au, av, advance = _path(l, 0.0, 0.0)
             _put(F, I, i, u, v, su, sv, au, av, advance, half, search)
@@ -276,15 +295,12 @@ def _place_horizon(F: Array, I: np.ndarray, at: int, n: int, view: View, sigma: 
 
 @kernel
 def place(
-    pose: Array,
+    sight: Array,
     cov: Array,
-    pan: float,
-    tilt: float,
     lever: Array,
     lens: Array,
     frame: Array,
     runway: Array,
-    strips: Array,
     paint: Array,
     mouths: Array,
     counts: np.ndarray,
@@ -292,16 +308,17 @@ def place(
 ) -> tuple[Array, np.ndarray, int, int]:
     """F (n, 12), I (n, 6) and the width and height [px] of all windows.
 
-    pose (6,), cov (6, 6) of x, y, H of the cg, phi, theta, psi; lens: f, cx, cy; frame: width, height; runway: width,
-    length, slope; strips, paint, mouths as RunwayMap gives them; counts (4,) windows by Feature; rule: see the columns.
+    sight (9,), cov (9, 9): see `prediction`; lens: f, cx, cy; frame: width, height; runway: length, slope, |y| of the
+    outermost and of the innermost side of the threshold stripes; paint, mouths as RunwayMap gives them; counts (4,) windows
+    by Feature; rule: see the columns.
     """
-    view = look(pose, lever, pan, tilt, lens, frame, runway)
-    sigma = spread(view, pose, cov, lever, pan, tilt, rule[EXTRA_SIGMA])
+    view = look(sight, lever, lens, frame, runway[0], runway[1])
+    sigma = spread(view, sight, cov, lever, rule[EXTRA_SIGMA])
     most = counts[0] + counts[1] + 2 * counts[2] + counts[3]
     F, I = np.zeros((most, 12)), np.zeros((most, 6), dtype=np.int64)
     F[:, :DIRECTION] = np.nan
     n_T = counts[THRESHOLD]
-    seen = _place_threshold(F, I, 0, n_T, view, sigma[THRESHOLD], rule, strips)
+    seen = _place_threshold(F, I, 0, n_T, view, sigma[THRESHOLD], rule, runway[2:])
     n_L, n_R = counts[LEFT] + (n_T - seen + 1) // 2, counts[RIGHT] + (n_T - seen) // 2
     _place_border(F, I, n_T, n_L, LEFT, view, sigma[LEFT], rule, paint, mouths)
     _place_border(F, I, n_T + n_L, n_R, RIGHT, view, sigma[RIGHT], rule, paint, mouths)

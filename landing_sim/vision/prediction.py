@@ -1,4 +1,7 @@
-"""What the believed pose makes of the runway's edges in the image: lines, displacements and their uncertainty."""
+"""What is believed of pose, platform and width makes of the runway's edges: lines, displacements, their uncertainty.
+
+All that may be uncertain is one vector, the sight: x, y, H [m] of the cg, phi, theta, psi, pan, tilt [rad], width [m].
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,9 @@ from landing_sim.geometry.runway_image import HORIZON, LEFT, RIGHT, THRESHOLD, d
 from landing_sim.geometry.so3 import camera_from_body, from_euler
 from landing_sim.jit import kernel
 from landing_sim.types import Array
+
+SIGHT = ("x", "y", "H", "phi", "theta", "psi", "pan", "tilt", "W")
+PAN, TILT, WIDTH = 6, 7, 8
 
 NEAR = 1.0  # [m] nothing nearer to the camera is looked at
 
@@ -26,7 +32,9 @@ class View(NamedTuple):
     R_CR: Array
     lens: Array  # f, cx, cy [px]
     frame: Array  # width, height [px]
-    runway: Array  # width, length [m], slope [rad]
+    width: float  # [m] of the runway
+    length: float
+    slope: float  # [rad]
     along: Array
     across: Array
     threshold: Array
@@ -36,12 +44,12 @@ class View(NamedTuple):
 
 
 @kernel
-def camera_pose(pose: Array, lever: Array, pan: float, tilt: float) -> tuple[Array, Array]:
-    """p_RC (3,), R_CR (3, 3) of a camera on a body at pose (x, y, H of the cg, phi, theta, psi)."""
-    R_RB = from_euler(pose[3], pose[4], pose[5])
-    R_CB = camera_from_body(pan, tilt)
+def camera_pose(sight: Array, lever: Array) -> tuple[Array, Array]:
+    """p_RC (3,), R_CR (3, 3) of the camera at `lever` (3,) [m] from the cg, frame B."""
+    R_RB = from_euler(sight[3], sight[4], sight[5])
+    R_CB = camera_from_body(sight[PAN], sight[TILT])
     p, R = np.empty(3), np.empty((3, 3))
-    p[0], p[1], p[2] = pose[0], pose[1], -pose[2]
+    p[0], p[1], p[2] = sight[0], sight[1], -sight[2]
     for i in range(3):
         for j in range(3):
             p[i] += R_RB[i, j] * lever[j]
@@ -50,13 +58,15 @@ def camera_pose(pose: Array, lever: Array, pan: float, tilt: float) -> tuple[Arr
 
 
 @kernel
-def feature_line(feature: int, p_RC: Array, R_CR: Array, lens: Array, runway: Array, u: float, v: float) -> Array:
+def feature_line(
+    feature: int, p_RC: Array, R_CR: Array, lens: Array, width: float, slope: float, u: float, v: float
+) -> Array:
     """l (3,) of the feature; the horizon's where the ray of pixel (u, v) looks."""
     azimuth = 0.0
     if feature == HORIZON:
         a, b = (u - lens[1]) / lens[0], (v - lens[2]) / lens[0]
         azimuth = math.atan2(a * R_CR[0, 1] + b * R_CR[1, 1] + R_CR[2, 1], a * R_CR[0, 0] + b * R_CR[1, 0] + R_CR[2, 0])
-    n = plane_normal(feature, p_RC, runway[0], runway[2], azimuth)
+    n = plane_normal(feature, p_RC, width, slope, azimuth)
     return image_line(n, R_CR, lens[0], lens[1], lens[2])
 
 
@@ -94,53 +104,50 @@ def _inverse(a: Array, b: Array, c: Array) -> Array:
 
 
 @kernel
-def look(pose: Array, lever: Array, pan: float, tilt: float, lens: Array, frame: Array, runway: Array) -> View:
-    """The scene as it should appear from `pose`."""
-    p, R = camera_pose(pose, lever, pan, tilt)
-    along = _image_of(math.cos(runway[2]), 0.0, -math.sin(runway[2]), R, lens)
+def look(sight: Array, lever: Array, lens: Array, frame: Array, length: float, slope: float) -> View:
+    """The scene as it should appear. lens: f, cx, cy; frame: width, height [px]; length [m], slope [rad] of the runway."""
+    p, R = camera_pose(sight, lever)
+    width = sight[WIDTH]
+    along = _image_of(math.cos(slope), 0.0, -math.sin(slope), R, lens)
     across = _image_of(0.0, 1.0, 0.0, R, lens)
     threshold = _image_of(-p[0], -p[1], -p[2], R, lens)
     up = _image_of(0.0, 0.0, -1.0, R, lens)
     u, v = (along[0] / along[2], along[1] / along[2]) if along[2] > 0.0 else (lens[1], lens[2])
     lines = np.empty((4, 3))
-    lines[LEFT] = oriented(feature_line(LEFT, p, R, lens, runway, u, v), across)
-    lines[RIGHT] = oriented(feature_line(RIGHT, p, R, lens, runway, u, v), -across)
-    lines[THRESHOLD] = oriented(feature_line(THRESHOLD, p, R, lens, runway, u, v), along)
-    lines[HORIZON] = oriented(feature_line(HORIZON, p, R, lens, runway, u, v), up)
-    return View(p, R, lens, frame, runway, along, across, threshold, up, _inverse(along, across, threshold), lines)
+    lines[LEFT] = oriented(feature_line(LEFT, p, R, lens, width, slope, u, v), across)
+    lines[RIGHT] = oriented(feature_line(RIGHT, p, R, lens, width, slope, u, v), -across)
+    lines[THRESHOLD] = oriented(feature_line(THRESHOLD, p, R, lens, width, slope, u, v), along)
+    lines[HORIZON] = oriented(feature_line(HORIZON, p, R, lens, width, slope, u, v), up)
+    ground = _inverse(along, across, threshold)
+    return View(p, R, lens, frame, width, length, slope, along, across, threshold, up, ground, lines)
 
 
 @kernel
 def jacobian(
-    feature: np.ndarray,
-    centre: Array,
-    direction: Array,
-    pose: Array,
-    lever: Array,
-    pan: float,
-    tilt: float,
-    lens: Array,
-    runway: Array,
+    feature: np.ndarray, centre: Array, direction: Array, sight: Array, lever: Array, lens: Array, slope: float
 ) -> tuple[Array, Array]:
-    """Predicted displacements h (n,) [px] and dh/dpose (n, 6) by central differences."""
+    """Predicted displacements h (n,) [px] and dh/dsight (n, 9) by central differences."""
     n = len(feature)
-    h, J = np.empty(n), np.empty((n, 6))
-    p, R = camera_pose(pose, lever, pan, tilt)
+    h, J = np.empty(n), np.empty((n, 9))
+    p, R = camera_pose(sight, lever)
     for i in range(n):
         c, s = centre[i], direction[i]
-        h[i] = displacement(feature_line(feature[i], p, R, lens, runway, c[0], c[1]), c[0], c[1], s[0], s[1])
-    moved = pose.copy()
-    for j in range(6):
-        eps = 1e-3 if j < 3 else 1e-5
-        moved[j] = pose[j] + eps
-        p_up, R_up = camera_pose(moved, lever, pan, tilt)
-        moved[j] = pose[j] - eps
-        p_dn, R_dn = camera_pose(moved, lever, pan, tilt)
-        moved[j] = pose[j]
+        l = feature_line(feature[i], p, R, lens, sight[WIDTH], slope, c[0], c[1])
+        h[i] = displacement(l, c[0], c[1], s[0], s[1])
+    moved = sight.copy()
+    for j in range(9):
+        eps = 1e-5 if 3 <= j < WIDTH else 1e-3
+        moved[j] = sight[j] + eps
+        p_up, R_up = camera_pose(moved, lever)
+        w_up = moved[WIDTH]
+        moved[j] = sight[j] - eps
+        p_dn, R_dn = camera_pose(moved, lever)
+        w_dn = moved[WIDTH]
+        moved[j] = sight[j]
         for i in range(n):
             c, s = centre[i], direction[i]
-            up = feature_line(feature[i], p_up, R_up, lens, runway, c[0], c[1])
-            dn = feature_line(feature[i], p_dn, R_dn, lens, runway, c[0], c[1])
+            up = feature_line(feature[i], p_up, R_up, lens, w_up, slope, c[0], c[1])
+            dn = feature_line(feature[i], p_dn, R_dn, lens, w_dn, slope, c[0], c[1])
             J[i, j] = displacement(up, c[0], c[1], s[0], s[1]) - displacement(dn, c[0], c[1], s[0], s[1])
             J[i, j] /= 2.0 * eps
     return h, J
@@ -169,8 +176,8 @@ def in_image(q0: Array, qd: Array, lo: float, hi: float, mu: float, mv: float, f
 
 
 @kernel
-def spread(view: View, pose: Array, cov: Array, lever: Array, pan: float, tilt: float, extra: float) -> Array:
-    """sigma (4,) [px] of each feature's line normal to itself, the larger one of two places on it.
+def spread(view: View, sight: Array, cov: Array, lever: Array, extra: float) -> Array:
+    """sigma (4,) [px] of each feature's line normal to itself, the larger one of two places on it; cov (9, 9).
 
     The places: the visible ends of a borderline, the corners for the threshold, and for the horizon (or whatever is not in
     view) left and right of the centre. `extra` [px] is added in quadrature.
@@ -183,20 +190,20 @@ def spread(view: View, pose: Array, cov: Array, lever: Array, pan: float, tilt: 
         centre[i, 0], centre[i, 1] = view.lens[1] + (which - 0.5) * 0.8 * view.frame[0], view.lens[2]
         q = np.zeros(3)
         if side in (LEFT, RIGHT):
-            q0 = view.threshold + (side - 0.5) * view.runway[0] * view.across
-            lo, hi = in_image(q0, view.along, 0.0, view.runway[1], 0.0, 0.0, view.frame)
+            q0 = view.threshold + (side - 0.5) * view.width * view.across
+            lo, hi = in_image(q0, view.along, 0.0, view.length, 0.0, 0.0, view.frame)
             if lo < hi:
                 q = q0 + (lo if which == 0 else hi) * view.along
         elif side == THRESHOLD:
-            q = view.threshold + (which - 0.5) * view.runway[0] * view.across
+            q = view.threshold + (which - 0.5) * view.width * view.across
         if q[2] >= 0.5 * NEAR:
             centre[i, 0], centre[i, 1] = q[0] / q[2], q[1] / q[2]
-    _, J = jacobian(feature, centre, direction, pose, lever, pan, tilt, view.lens, view.runway)
+    _, J = jacobian(feature, centre, direction, sight, lever, view.lens, view.slope)
     sigma = np.zeros(4)
     for i in range(8):
         var = extra * extra
-        for j in range(6):
-            for k in range(6):
+        for j in range(9):
+            for k in range(9):
                 var += J[i, j] * cov[j, k] * J[i, k]
         sigma[i // 2] = max(sigma[i // 2], math.sqrt(max(0.0, var)))
     return sigma

@@ -134,17 +134,9 @@ class WindowPlanner:
     """Lays out the windows of a frame and measures them: the believed runway and camera, made ready once."""
 
     __slots__ = (
-        "_constants",
-        "_edges",
-        "_frame",
-        "_lens",
-        "_lever",
-        "_noise",
-        "_polarity",
-        "_rule",
-        "camera",
-        "runway",
-    )
+        "_frame", "_lens", "_lever", "_mouths", "_noise", "_paint", "_polarity", "_rule", "_runway",
+        "camera", "runway",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -158,29 +150,36 @@ class WindowPlanner:
         self._lever: Array = np.array(camera.p_BC, dtype=float)
         self._lens: Array = np.array([k.f, k.cx, k.cy], dtype=float)
         self._frame: Array = np.array([k.width, k.height], dtype=float)
-        self._constants = (
-            np.array([runway.width, runway.length, runway.slope], dtype=float),
-            runway.clean_strips(),
-            runway.border_paint(),
-            runway.mouth_rows(),
+        stripes = runway.stripes
+        self._runway: Array = np.array(
+            [runway.length, runway.slope, stripes.outermost, stripes.gap if stripes.count else 0.0], dtype=float
         )
+        self._paint, self._mouths = runway.border_paint(), runway.mouth_rows()
         self._rule: Array = np.array([s.mask, s.sigmas, s.search_min, s.search_max, s.extra_sigma, s.separation], float)
         sign = 1.0 if runway.brighter else -1.0
         self._polarity: Array = np.array([sign, sign, sign, 1.0])
         self._noise: Array = np.array([camera.blur, camera.noise, e.min_contrast, e.min_snr, e.ambiguity, e.floor])
 
-    def place(self, pose: Array, cov: Array, pan: float, tilt: float, counts: np.ndarray) -> Windows:
-        """pose (6,) x, y, H [m] of the cg, phi, theta, psi [rad]; cov (6, 6); counts (4,) int64 windows by Feature."""
-        return Windows(
-            *place(pose, cov, pan, tilt, self._lever, self._lens, self._frame, *self._constants, counts, self._rule)
+    def place(self, sight: Array, cov: Array, counts: np.ndarray) -> Windows:
+        """sight (9,), cov (9, 9): see `prediction`; counts (4,) int64 windows by Feature."""
+        F, I, width, height = place(
+            sight,
+            cov,
+            self._lever,
+            self._lens,
+            self._frame,
+            self._runway,
+            self._paint,
+            self._mouths,
+            counts,
+            self._rule,
         )
+        return Windows(F, I, width, height)
 
-    def predict(
-        self, feature: np.ndarray, centre: Array, direction: Array, pose: Array, pan: float, tilt: float
-    ) -> tuple[Array, Array]:
-        """Displacements h (n,) [px] from the centres at a pose, and their derivatives (n, 6)."""
+    def predict(self, feature: np.ndarray, centre: Array, direction: Array, sight: Array) -> tuple[Array, Array]:
+        """Displacements h (n,) [px] from the centres, and their derivatives (n, 9) by the sight."""
         return jacobian(  # type: ignore[no-any-return]
-            feature, centre, direction, pose, self._lever, pan, tilt, self._lens, self._constants[0]
+            feature, centre, direction, sight, self._lever, self._lens, self.runway.slope
         )
 
     def measure(self, frame: Frame, windows: Windows) -> tuple[Array, Array, Array, np.ndarray]:
