@@ -23,9 +23,9 @@ GUST = tuple(Run("do128/gust", seed=seed) for seed in SEEDS)
 SPLIT = tuple(Run("do128/gust", ("filter.kind=split", "filter.factorisation=ud"), seed) for seed in SEEDS)
 PLAIN = tuple(Run("do128/gust", ("filter.kind=plain", "filter.factorisation=ud"), seed) for seed in (1, 2))
 LEVEL_GUST = (Run("do128/gust", ("wind.gust.vertical_mps=0",)),)
-COMMANDED = ("vision.platform_angle=commanded", "camera.platform.stabilisation=0")
-LAGGING = tuple(Run("do128/gust", (*COMMANDED, "camera.platform.lag_s=0.1"), seed) for seed in (1, 2))
-PROMPT = tuple(Run("do128/gust", (*COMMANDED, "camera.platform.lag_s=0"), seed) for seed in (1, 2))
+_COMMANDED = ("filter.kind=split", "filter.factorisation=ud", "vision.platform_angle=commanded")
+LAGGING = tuple(Run("do128/gust", (*_COMMANDED, "camera.platform.lag_s=0.08"), seed) for seed in (1, 2, 3))
+PROMPT = tuple(Run("do128/gust", (*_COMMANDED, "camera.platform.lag_s=0"), seed) for seed in (1, 2, 3))
 WIDTH = tuple(
     Run("do128/gust", ("filter.width=separate", f"filter.believed_width_m={width}"), seed)
     for width, seed in ((25, 1), (33, 2), (25, 3), (33, 4))
@@ -100,8 +100,8 @@ CLAIMS: tuple[Claim, ...] = (
     ),
     Claim(
         "flare-onset", "a rather large height error at flare onset, from the delay of the tilt loop", "7.1", None, "times",
-        "jump of the height error within 3 s of flare onset: platform with 0.1 s lag over one without, commanded angles "
-        "taken for the true ones and no inertial stabilisation",
+        "jump of the height error within 3 s of flare onset: platform with 0.08 s lag over one without; filter in two "
+        "halves that takes the commanded angles for the true ones",
         (*LAGGING, *PROMPT), m.onset_with_lag, at_least(2.0), "agrees if the lag at least doubles it",
     ),
     Claim(

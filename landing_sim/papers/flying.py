@@ -58,13 +58,13 @@ def fly(run: Run) -> Flown:
             RadarAltimeter(RadarAltimeterConfig(), Noise(run.seed, "radar_altimeter")),
         )
     watch = Stopwatch()
-    mission.parts = replace(
-        parts,
-        front_ends={name: TimedFrontEnd(part, watch) for name, part in parts.front_ends.items()},
-        estimator=TimedEstimator(parts.estimator, watch),
-        guidance=TimedPart(guidance, watch),
-        controller=TimedPart(controller, watch),
-    )
+    timed: dict[str, Any] = {
+        "front_ends": {name: TimedFrontEnd(part, watch) for name, part in parts.front_ends.items()},
+        "estimator": TimedEstimator(parts.estimator, watch),
+        "guidance": TimedPart(guidance, watch),
+        "controller": TimedPart(controller, watch),
+    }
+    mission.parts = replace(parts, **timed)
     builder = LogBuilder()
     readings: dict[str, list[Any]] = {reference.name: [] for reference in references}
     onboard, estimator = [], []

@@ -1,0 +1,78 @@
+"""A paper's claims beside our figures, as one HTML file that needs nothing else: no network, no scripts."""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from landing_sim.papers.claims import Row, Run
+from landing_sim.papers.figures import Figure
+from landing_sim.papers.template import TEMPLATE
+
+_WORDS = {"met": "met", "not_met": "not met", "not_comparable": "not comparable"}
+
+
+def html(title: str, rows: Sequence[Row], figures: Sequence[Figure], versions: Mapping[str, str]) -> str:
+    """The report's text. Same rows and figures, same bytes."""
+    import jinja2
+
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["number"] = number
+    return environment.from_string(TEMPLATE).render(
+        title=title,
+        rows=rows,
+        words=_WORDS,
+        counts={verdict: sum(row.verdict == verdict for row in rows) for verdict in _WORDS},
+        figures=figures,
+        settings=_settings(rows),
+        versions=versions,
+    )
+
+
+def write(text: str, path: Path) -> None:
+    """Whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def number(value: float | None) -> str:
+    """Three figures that matter; a dash for what does not exist."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    if value == 0.0:
+        return "0"
+    digits = max(0, 2 - math.floor(math.log10(abs(value))))
+    text = f"{value:.{min(digits, 4)}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def _settings(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
+    """(scenario and who flies, changes, seeds) of every group of flights."""
+    groups: dict[tuple[str, bool, tuple[str, ...]], list[int]] = {}
+    for run in dict.fromkeys(run for row in rows for run in row.claim.runs):
+        groups.setdefault((run.scenario, run.pilot, run.changes), []).append(run.seed)
+    return [
+        (
+            name + (", flown by the scripted pilot" if pilot else ""),
+            "  ".join(changes),
+            ", ".join(map(str, sorted(seeds))),
+        )
+        for (name, pilot, changes), seeds in groups.items()
+    ]
+
+
+def told(run: Run) -> str:
+    """One line about a flight that starts, for whoever waits."""
+    who = "scripted pilot" if run.pilot else "autopilot"
+    return f"{run.scenario} seed {run.seed} ({who}) {' '.join(run.changes)}".rstrip()
