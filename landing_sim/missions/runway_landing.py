@@ -177,7 +177,7 @@ def _wind(scenario: Scenario, noise: Noise) -> Wind:
     turbulence = None
     if w.turbulence is not None:
         t = w.turbulence
-        turbulence = Turbulence(t.wind_at_20ft_mps if t.severity is None else W20[t.severity])
+        turbulence = Turbulence((t.wind_at_20ft_mps or 0.0) if t.severity is None else W20[t.severity])
     config = WindConfig(
         steady=SteadyWind(w.headwind_mps, w.crosswind_mps if everywhere else 0.0),
         step=None if w.crosswind_from_x_m is None else CrosswindStep(w.crosswind_from_x_m, w.crosswind_mps),
@@ -262,7 +262,7 @@ def _believed_camera(scenario: Scenario, vehicle: Vehicle) -> BelievedCamera:
     c = scenario.camera
     return BelievedCamera(
         Intrinsics.centred(c.width_px, c.height_px, c.focal_px * scenario.believed.focal_scale),
-        tuple(vehicle.camera.p_BC_m),
+        vehicle.camera.p_BC_m,
         c.blur_px,
         max(c.noise_dn, 0.3),  # grey levels are whole numbers: never less than their rounding
         math.radians(abs(c.platform.encoder_bias_deg)),
