@@ -92,14 +92,15 @@ def reproduce(
     if paper not in PAPERS:
         near = did_you_mean(paper, PAPERS) or f"; there are: {', '.join(PAPERS)}"
         raise ConfigError([Problem(Mark(paper), (), f"no such paper{near}")])
-    from landing_sim import progress
-    from landing_sim.papers import reproduction
+    from landing_sim import papers, progress, runner
 
-    result = reproduction.reproduce(PAPERS[paper], out or Path("out") / paper, lambda text: typer.echo(text, err=True))
+    folder = out or Path("out") / paper
+    runner.check_out(folder, ("report.html", "claims.json"))
+    found = papers.reproduce(paper, folder, lambda line: typer.echo(line, err=True))
     if json_:
-        typer.echo(json.dumps(result, allow_nan=False))
+        typer.echo(json.dumps(found.result, allow_nan=False))
     else:
-        progress.claims(result)
+        progress.claims(found.result, found.report)
 
 
 @app.command()

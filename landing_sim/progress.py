@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from landing_sim.scenario import Scenario
@@ -114,7 +115,7 @@ def table(result: dict[str, Any]) -> None:
         )
 
 
-def claims(result: dict[str, Any]) -> None:
+def claims(result: dict[str, Any], report: Path) -> None:
     """The result of `reproduce`: every claim, the paper's value beside ours."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
@@ -130,8 +131,7 @@ def claims(result: dict[str, Any]) -> None:
     console.print(rows)
     counts = {verdict: sum(c["verdict"] == verdict for c in result["claims"]) for verdict in styles}
     console.print(", ".join(f"{n} {verdict.replace('_', ' ')}" for verdict, n in counts.items()), highlight=False)
-    for kind, file in result.get("files", {}).items():
-        console.print(f"  {kind:10} {file}", highlight=False, soft_wrap=True)
+    console.print(f"  report     {report}", highlight=False, soft_wrap=True)
 
 
 def _console() -> Any:

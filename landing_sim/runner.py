@@ -8,7 +8,7 @@ import os
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -118,20 +118,22 @@ def limits(scenario: Scenario) -> tuple[judge.Limit, ...]:
     return tuple(judge.Limit(c.metric, c.low, c.high, c.source) for c in scenario.criteria)
 
 
-def check_out(folder: Path) -> None:
-    """Raise ScenarioError if writing results to `folder` would touch anything that is not an earlier run's."""
+def check_out(folder: Path, ours: Container[str] = _OURS) -> None:
+    """Raise ScenarioError if `folder` holds anything, but no earlier run of ours, whose files are named in `ours`."""
 
     def refuse(message: str) -> ScenarioError:
         return ScenarioError([Problem(Mark(f"--out {folder}"), (), message)])
 
     if folder.exists() and not folder.is_dir():
         raise refuse("is a file, not a folder")
-    if folder.is_dir() and any(folder.iterdir()) and not _is_run(folder):
+    if folder.is_dir() and not _is_ours(folder, ours):
         raise refuse("is not empty and holds no earlier run: name another folder, or empty it")
 
 
-def _is_run(folder: Path) -> bool:
-    if {entry.name for entry in folder.iterdir()} <= set(_OURS):
+def _is_ours(folder: Path, ours: Container[str]) -> bool:
+    """Nothing but files of ours, or a result of ours and what others have put beside it."""
+    names = [entry.name for entry in folder.iterdir()]
+    if all(name in ours for name in names):
         return True
     try:
         result = json.loads((folder / RESULT).read_text())
