@@ -171,7 +171,7 @@ class Measurement:
     """What a front end or an inertial sensor tells the estimator.
 
     kinds      "edges": z (n,) px, R (n,) variances, geometry an EdgeSet
-               "pose": z (6,) x, y, H of the camera, phi, theta, psi of the body; R (6, 6): acquisition
+               "pose": z (6,) x, y, H of the cg, phi, theta, psi of the body; R (6, 6): acquisition
                "gyro": z (3,) rad/s, R (3,); "airspeed": z (1,) m/s, R (1,); "on_ground": z (1,) 0 or 1
     """
 
