@@ -9,8 +9,10 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import get_args
 
 import pytest
+from pydantic import BaseModel
 
 import landing_sim
 from landing_sim import paths
@@ -128,3 +130,25 @@ def test_nothing_needs_the_workplace() -> None:
             text = file.read_text()
             assert "/work/" not in text, file
             assert "/root/" not in text, file
+
+
+def test_no_setting_is_ignored() -> None:
+    """Every key of scenario and vehicle files is read somewhere; one that nothing reads would be a silent wish."""
+    from landing_sim import scenario, vehicle
+
+    reads: set[str] = set()
+    for path in modules():
+        if part(path) in ("missions", "runner", "cli", "progress"):  # who is handed a scenario
+            reads |= {node.attr for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Attribute)}
+    elsewhere = {"schema_version", "mission", "description"}  # read while loading, or for people
+
+    def leaves(model: type[BaseModel]) -> Iterator[str]:
+        for name, field in model.model_fields.items():
+            nested = [t for t in (field.annotation, *get_args(field.annotation)) if isinstance(t, type)]
+            sections = [t for t in nested if issubclass(t, BaseModel)]
+            yield from (leaf for section in sections for leaf in leaves(section))
+            yield name
+
+    for model in (scenario.Scenario, vehicle.Vehicle):
+        ignored = set(leaves(model)) - reads - elsewhere
+        assert not ignored, f"nothing reads {sorted(ignored)} of a {model.__name__}"

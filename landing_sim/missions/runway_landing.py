@@ -135,7 +135,7 @@ def build(scenario: Scenario, vehicle: Vehicle, seed: int, run: int = 0) -> Miss
 
     clock = loop.Clock.of(scenario.time.step_s, scenario.time.cycle_s, scenario.control.delay_s)
     wind = _wind(scenario, noise("turbulence"))
-    platform = _platform(scenario)
+    platform = _platform(scenario, vehicle)
     plant = _plant(scenario, vehicle, platform, wind)
     sensors = _sensors(scenario, plant, platform, noise)
     camera = _believed_camera(scenario, vehicle)
@@ -166,6 +166,7 @@ def _runway(scenario: Scenario) -> Runway:
         length=r.length_m,
         slope=math.atan(r.slope_percent / 100.0),
         painted=r.markings,
+        side_stripes=r.side_stripes,
         taxiways=tuple(Taxiway(t.x_m, t.width_m, t.side, t.flare_m) for t in r.taxiways),
         greys=Greys(sky=r.grey.sky, grass=r.grey.grass, surface=r.grey.surface, paint=r.grey.marking),
     )
@@ -189,12 +190,14 @@ def _wind(scenario: Scenario, noise: Noise) -> Wind:
     return Wind(config, noise)
 
 
-def _platform(scenario: Scenario) -> PanTilt:
+def _platform(scenario: Scenario, vehicle: Vehicle) -> PanTilt:
     """The camera mount, turned to where the runway is thought to be: an operator's job, good to a degree or so."""
     p, start = scenario.camera.platform, scenario.initial
     return PanTilt(
         lag=p.lag_s,
         rate_limit=math.radians(p.rate_limit_dps),
+        pan_limit=math.radians(vehicle.camera.pan_limit_deg),
+        tilt_limit=math.radians(vehicle.camera.tilt_limit_deg),
         stabilisation=p.stabilisation,
         pan=-math.radians(start.heading_deg),
         tilt=-math.radians(start.flight_path_deg),
