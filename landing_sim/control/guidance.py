@@ -31,6 +31,7 @@ class GuidanceMemory:
     seen: float = -math.inf  # [s] when the estimate was last valid
     crosswind: float = 0.0  # [m/s] smoothed
     waiting: float = 0.0  # [s] for how long touchdown or instability has been suspected
+    bounced: bool = False  # airborne again after touchdown
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of a go-around: time [s], height [m], climb rate [m/s]
 
 
@@ -128,6 +129,7 @@ class LandingGuidance:
             estimate.t if estimate.valid else memory.seen,
             crosswind,
             waiting,
+            memory.bounced or (memory.mode == "rollout" and mode == "decrab"),
             (estimate.t, b.H, m.H_dot) if started else memory.start,
         )
         if mode == "rollout" or mode == "stopped":
@@ -143,6 +145,10 @@ class LandingGuidance:
         height, wheel_x = wheels
         H_path, slope, curvature = path.height(wheel_x)
         V, V_slope = path.speed(wheel_x)
+        if memory.bounced:  # down again from where it is, as steeply as the flare is there
+            falling = max(height, 0.0) + path.sink_height
+            H_path, slope, curvature = height, -falling / path.length, falling / path.length**2
+            V, V_slope = path.touchdown, 0.0
         limit = s.path.height_error_limit_m
         error = min(max(H_path - height, -limit), limit)
         crab = -memory.crosswind / max(m.airspeed, 0.5 * path.touchdown)
@@ -196,9 +202,11 @@ class LandingGuidance:
         height, wheel_x = wheels
         if mode == "go_around" or mode == "stopped":
             return mode, 0.0
-        if mode == "rollout":
-            return ("stopped" if math.hypot(m.x_dot, m.y_dot) < s.stopped_mps else mode), 0.0
         down = estimate.flags.get("on_ground")
+        if mode == "rollout":
+            if height > s.bounce_height_m and not down:
+                return "decrab", 0.0
+            return ("stopped" if math.hypot(m.x_dot, m.y_dot) < s.stopped_mps else mode), 0.0
         if down or (down is None and height <= s.touchdown_height_m):
             waiting = memory.waiting + dt
             if down or waiting >= s.touchdown_confirm_s:

@@ -44,7 +44,7 @@ class ControlMemory:
 class LandingController:
     """interfaces.Controller. Constants only; all memory is in ControlMemory."""
 
-    __slots__ = ("_camera", "_flap", "_ground_effect", "_integral", "_limits", "_rollout", "_schedule", "_slowest",
+    __slots__ = ("_camera", "_flaps", "_ground_effect", "_integral", "_limits", "_rollout", "_schedule", "_slowest",
                  "_thrust", "_trim")  # fmt: skip
 
     def __init__(self, design: Design) -> None:
@@ -60,7 +60,7 @@ class LandingController:
         self._integral = (s.integral_limits["int_V"], s.integral_limits["int_H"])
         c = s.camera
         self._camera = tuple(math.radians(a) for a in (c.elevation_deg, c.search_pan_deg, c.search_tilt_deg, c.max_deg))
-        self._flap = s.flap
+        self._flaps = (s.flap, s.flap if s.rollout.flap is None else s.rollout.flap)
         self._ground_effect = s.ground_effect
         self._rollout = Rollout(s.rollout)
 
@@ -74,7 +74,7 @@ class LandingController:
                 pan, tilt = look_along(estimate["phi"], estimate["theta"], estimate["psi"], 0.0, elevation)
             elevator, throttle = self._trim
             return ControlMemory(estimate.t, "acquire", elevator=elevator), Command(
-                elevator, 0.0, 0.0, throttle, self._flap, 0.0, 0.0, _clip(pan, most), _clip(tilt, most)
+                elevator, 0.0, 0.0, throttle, self._flaps[0], 0.0, 0.0, _clip(pan, most), _clip(tilt, most)
             )
         b = believed(estimate)
         m = motion(b)
@@ -86,16 +86,17 @@ class LandingController:
                 ground = RolloutMemory(b.theta, memory.elevator if math.isfinite(memory.elevator) else 0.0)
             ground, (elevator, aileron, rudder, left, right) = self._rollout.step(ground, b, m, reference, dt)
             throttle = int_V = int_H = 0.0
+            flap = self._flaps[1]
         else:
             elevator, throttle, aileron, rudder, int_V, int_H = self._fly(memory, b, m, reference, dt)
-            ground, left, right = ON_TOUCHDOWN, 0.0, 0.0
+            ground, left, right, flap = ON_TOUCHDOWN, 0.0, 0.0, self._flaps[0]
         last = memory.elevator if memory.elevator == memory.elevator else elevator
         elevator = _limited(elevator, last, dt, *self._limits[0])
         aileron = _limited(aileron, memory.aileron, dt, *self._limits[1])
         rudder = _limited(rudder, memory.rudder, dt, *self._limits[2])
         return ControlMemory(
             estimate.t, reference.mode, int_V, int_H, elevator, aileron, rudder, ground
-        ), Command(elevator, aileron, rudder, throttle, self._flap, left, right, _clip(pan, most), _clip(tilt, most))
+        ), Command(elevator, aileron, rudder, throttle, flap, left, right, _clip(pan, most), _clip(tilt, most))
 
     def _fly(
         self, memory: ControlMemory, b: Believed, m: Motion, ref: Reference, dt: float

@@ -149,6 +149,7 @@ class RolloutSettings:
     brake_steering_per_deg: float
     steering_mps: float
     brake_rate_per_s: float = 0.5
+    flap: float | None = None  # on the wheels; as in flight if not given
 
     __pydantic_config__ = _STRICT
 
@@ -301,6 +302,7 @@ class GuidanceSettings:
     go_around: GoAroundSettings
     touchdown_height_m: float  # estimated wheel height that counts as touchdown, if the estimate has no flag on_ground
     touchdown_confirm_s: float
+    bounce_height_m: float = 0.5  # wheel height in the rollout from which the flare is flown again
     stopped_mps: float = 0.5
 
     __pydantic_config__ = _STRICT
