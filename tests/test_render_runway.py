@@ -36,7 +36,7 @@ def test_stripes_by_width(width: float, count: int) -> None:
 
 
 @pytest.mark.parametrize("width", [8.0, 18.0, 23.0, 29.0, 45.0, 80.0])
-@pytest.mark.parametrize("length", [300.0, 799.0, 1000.0, 1680.0, 4000.0])
+@pytest.mark.parametrize("length", [50.0, 300.0, 799.0, 1000.0, 1680.0, 4000.0])
 def test_paint_stays_on_the_runway_and_apart(width: float, length: float) -> None:
     marks = runway_markings(width, length, side_stripes=True)
     for m in marks:
