@@ -33,6 +33,8 @@ class Flown:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
+    """A figure of ours, and what to say about it."""
+
     value: float
     note: str = ""
 
@@ -63,6 +65,8 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class Row:
+    """A claim with its verdict."""
+
     claim: Claim
     value: float
     verdict: Outcome
