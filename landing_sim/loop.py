@@ -82,6 +82,7 @@ def simulate(
     acting = trim
     pending: deque[tuple[int, Command]] = deque()
     in_flight: list[Sample] = []
+    last_seen = None  # the residuals of an image are passed on once
 
     while True:
         t = tick * clock.dt
@@ -105,7 +106,8 @@ def simulate(
         controller_memory, command = controller.step(controller_memory, estimate, reference)
         pending.append((tick + clock.delay, command))
 
-        seen = estimate.residuals
+        seen = None if estimate.residuals is last_seen else estimate.residuals
+        last_seen = estimate.residuals
         yield Step(
             truth,
             camera,

@@ -207,7 +207,7 @@ class Estimate:
     cov: Array | None  # (n, n)
     valid: bool
     flags: Mapping[str, bool] = field(default_factory=dict)  # threshold_in_view, on_ground, lost, reinflated
-    residuals: Residuals | None = None  # None when no image was processed since the last reading
+    residuals: Residuals | None = None  # of the latest image
 
     def __getitem__(self, name: str) -> float:
         return float(self.mean[self.names.index(name)])

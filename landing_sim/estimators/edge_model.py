@@ -40,7 +40,8 @@ def edge_model(
     """Fill h (n,) [px] and Hx (n, 23) = dh/dx for n windows.
 
     x (23,) layout of `states`; feature (n,) Feature codes; centre, direction (n, 2) [px]; pan, tilt [rad] as the encoders
-    say (their errors are part of x: reading = true + bias + noise); lever (3,) camera in body axes [m]; focal (3,) f, cx, cy [px].
+    say (their errors are part of x: reading = true + bias + noise); lever (3,) camera in body axes [m]; focal (3,) f, cx,
+    cy [px].
     """
     f, cx, cy = focal[0], focal[1], focal[2]
     phi, theta, psi = x[PHI], x[THETA], x[PSI]

@@ -21,6 +21,7 @@ from landing_sim.estimators.aircraft_model import downwash, parameters, propagat
 from landing_sim.estimators.belief import AircraftBelief
 from landing_sim.estimators.edge_model import edge_model
 from landing_sim.estimators.inertial_model import airspeed_model, gyro_model
+from landing_sim.estimators.width import Scaled, WidthFilter, rescaled
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.signals import Command, EdgeSet, Estimate, Feature, Measurement, Residuals, Status
 from landing_sim.types import Array
@@ -80,7 +81,8 @@ class Memory:
     on_ground: bool = False
     threshold_in_view: bool = False
     reinflated: int = 0
-    residuals: Residuals | None = None
+    residuals: Residuals | None = None  # of the latest image
+    width_variance: float = 0.0  # [m^2] of the separate width filter
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,13 +101,11 @@ class Blocks:
             groups = [states.PAPER]
         else:
             wind: tuple[int, ...] = states.WIND
-            if config.width != "known":
+            if config.width == "state":
                 wind = wind[1:]  # along-track wind and width scale the scene alike: not both
             groups = [states.PAPER + wind + states.GYRO_BIAS + states.ENCODER]
         if config.width == "state":
             groups[0] += (states.WIDTH,)
-        elif config.width == "separate":
-            groups.append((states.WIDTH,))
         bounds = np.cumsum([0] + [len(g) for g in groups])
         return Blocks(np.array(sum(groups, ()), dtype=np.int64), bounds.astype(np.int64))
 
@@ -126,6 +126,10 @@ class RunwayEkf:
         self.config = config
         self.blocks = Blocks.of(config)
         self.names = tuple(states.NAMES[i] for i in self.blocks.index)
+        self._scaled = Scaled(self.blocks.index) if config.width == "state" else None
+        self._width_filter = WidthFilter(config.airspeed_sigma) if config.width == "separate" else None
+        if self._width_filter is not None:
+            self.names = (*self.names, "W")
         self._par = parameters(belief, slope)
         self._focal = np.array([camera.f, camera.cx, camera.cy])
         self._lever = np.asarray(lever, dtype=float)
@@ -155,8 +159,8 @@ class RunwayEkf:
     def init(self, t: float) -> Memory:
         x = np.zeros(states.N)
         x[states.WIDTH] = self._width
-        n = len(self.names)
-        return Memory(t, False, x, np.zeros(6), np.zeros((n, n)), None)
+        n = len(self.blocks.index)
+        return Memory(t, False, x, np.zeros(6), np.zeros((n, n)), None, width_variance=self.config.width_sigma**2)
 
     def predict(self, memory: Memory, command: Command, t: float) -> Memory:
         """To time t under `command` (eqs. 8, 9). Before the start only time passes."""
@@ -166,7 +170,7 @@ class RunwayEkf:
         u = np.array([command.elevator, command.aileron, command.rudder, command.throttle, command.flap])
         if not memory.valid:
             steady = thrust(command.throttle, memory.airspeed, self._par)
-            return replace(memory, t=t, shadow=np.array([*u[:3], command.flap, steady, 0.0]), residuals=None)
+            return replace(memory, t=t, shadow=np.array([*u[:3], command.flap, steady, 0.0]))
         x, shadow = memory.x.copy(), memory.shadow.copy()
         Phi15 = np.empty((15, 15))
         propagate(x, shadow, u, self._par, memory.on_ground, dt, Phi15)
@@ -179,7 +183,7 @@ class RunwayEkf:
             P = kalman.predict_dense(P, Phi, Qd, self.blocks.starts)
         else:
             P, D = kalman.predict_ud(P, D, Phi, Qd, self.blocks.starts)
-        return replace(memory, t=t, x=x, shadow=shadow, P=P, D=D, residuals=None)
+        return replace(memory, t=t, x=x, shadow=shadow, P=P, D=D)
 
     def update(self, memory: Memory, measurement: Measurement) -> Memory:
         """Take in one measurement at the memory's time (eqs. 10-12)."""
@@ -212,10 +216,15 @@ class RunwayEkf:
             "lost": memory.misses >= self.config.lost_after,
             "reinflated": memory.reinflated > 0,
         }
-        cov = None
+        mean, cov = memory.x[self.blocks.index], None
         if memory.valid:
-            cov = memory.P if memory.D is None else kalman.ud_product(memory.P, memory.D)
-        return Estimate(memory.t, self.names, memory.x[self.blocks.index], cov, memory.valid, flags, memory.residuals)
+            cov = self._covariance(memory)
+        if self._width_filter is not None:
+            mean = np.append(mean, memory.x[states.WIDTH])
+            if cov is not None:
+                cov = np.pad(cov, (0, 1))
+                cov[-1, -1] = memory.width_variance
+        return Estimate(memory.t, self.names, mean, cov, memory.valid, flags, memory.residuals)
 
     # ------------------------------------------------------------------------------------------- start
 
@@ -227,6 +236,8 @@ class RunwayEkf:
         sd[6:9] = (2.0 * RAD, 2.0 * RAD, 2.0 * RAD)
         sd[9:12] = (40.0, 10.0, 5.0)
         sd[12:15] = c.wind_sigma
+        if c.width == "separate":
+            sd[states.WX] = 8.0  # m/s: a wrong width looks like wind along the track
         sd[15:18] = c.gyro_bias_sigma
         sd[[states.EPAN, states.ETILT]] = c.encoder_sigma
         sd[[states.JPAN, states.JTILT]] = c.encoder_noise
@@ -265,12 +276,18 @@ class RunwayEkf:
             shadow = shadow.copy()
             shadow[5] = downwash(x, alpha, shadow[3], self._par)
         start = replace(memory, valid=True, x=x, shadow=shadow, frames=0, misses=0, rejected=0.0)
-        if c.factorisation == "ud":
-            U, D = kalman.ud_factor(P)
-            return replace(start, P=U, D=D)
-        return replace(start, P=P, D=None)
+        return self._with_covariance(start, P)
 
     # ------------------------------------------------------------------------------------------- updates
+
+    def _covariance(self, memory: Memory) -> Array:
+        return memory.P if memory.D is None else kalman.ud_product(memory.P, memory.D)
+
+    def _with_covariance(self, memory: Memory, P: Array) -> Memory:
+        if self.config.factorisation == "dense":
+            return replace(memory, P=P, D=None)
+        U, D = kalman.ud_factor(P)
+        return replace(memory, P=U, D=D)
 
     def _process_noise(self, Phi: Array, dt: float, phase: str) -> Array:
         q = self._q[phase]
@@ -297,7 +314,9 @@ class RunwayEkf:
             return P, None, dx, nis
         return kalman.update_ud(memory.P.copy(), memory.D.copy(), Hn, R, nu, use, self.blocks.starts)
 
-    def _moved(self, x: Array, dx: Array) -> Array:
+    def _moved(self, x: Array, dx: Array, scaled: Scaled | None = None) -> Array:
+        if scaled is not None:
+            return scaled.moved(x, dx, self.blocks.index)
         out = x.copy()
         out[self.blocks.index] += dx
         return out
@@ -310,11 +329,15 @@ class RunwayEkf:
         found = np.isfinite(m.z)
         h, Hx = np.empty(n), np.empty((n, states.N))
         starting = memory.frames < c.start_frames
-        x = memory.x
+        x, step = memory.x, np.zeros(len(self.blocks.index))
         R = np.where(found, m.R + self._extra_R, 1.0)
         innovation: Array | None = None
         status = edges.status.copy()
         use = found
+        prior = memory
+        if self._scaled is not None:
+            T_inverse = self._scaled.inverse(x)
+            prior = self._with_covariance(memory, T_inverse @ self._covariance(memory) @ T_inverse.T)
         for i in range(c.start_iterations if starting else 1):
             self._predict_edges(x, edges, h, Hx)
             Hn = np.ascontiguousarray(Hx[:, self.blocks.index])
@@ -323,30 +346,45 @@ class RunwayEkf:
                 innovation = np.where(found, nu, np.nan)
                 use = found & np.isfinite(nu)
                 if not starting and c.gate_sigma is not None:
-                    P = memory.P if memory.D is None else kalman.ud_product(memory.P, memory.D)
-                    s = kalman.innovation_variance(P, Hn, R)
+                    s = kalman.innovation_variance(self._covariance(memory), Hn, R)
                     use &= nu * nu <= c.gate_sigma**2 * s
                     status[found & ~use] = Status.REJECTED
-            nu = nu + Hn @ (x - memory.x)[self.blocks.index]
+            if self._scaled is not None:
+                Hn = Hn @ self._scaled.matrix(x)
+            nu = nu + Hn @ step
             R_used = R
             if starting:  # Huber: an edge far off at the current iterate counts less
                 sd = np.sqrt(R) * c.huber
                 R_used = R * np.maximum(1.0, np.abs(m.z - h) / sd, where=found, out=np.ones(n))
-            P_new, D_new, dx, nis = self._kalman(memory, Hn, R_used, nu, use)
-            x = self._moved(memory.x, dx)
+            P_new, D_new, step, nis = self._kalman(prior, Hn, R_used, nu, use)
+            x = self._moved(memory.x, step, self._scaled)
         dof = int(use.sum())
+        updated = replace(memory, x=x, P=P_new, D=D_new)
+        if self._scaled is not None:
+            T = self._scaled.matrix(x)
+            updated = self._with_covariance(updated, T @ self._covariance(updated) @ T.T)
         after = replace(
-            memory,
-            x=x,
-            P=P_new,
-            D=D_new,
+            updated,
             frames=memory.frames + 1,
             misses=0 if dof else memory.misses + 1,
             threshold_in_view=bool(np.any(use & (edges.feature == Feature.THRESHOLD))),
             residuals=Residuals(innovation if innovation is not None else np.full(n, np.nan), status, nis, dof),
             reinflated=max(0, memory.reinflated - 1),
         )
+        if self._width_filter is not None and after.threshold_in_view and not starting:
+            after = self._widened(after, self._width_filter)
         return self._watchdog(after, int(found.sum()), dof)
+
+    def _widened(self, memory: Memory, second: WidthFilter) -> Memory:
+        """The second filter's turn, and the scene rescaled to its width."""
+        x = memory.x
+        ground = math.sqrt(x[states.U] ** 2 + x[states.V] ** 2 + x[states.W] ** 2)
+        row = int(np.flatnonzero(self.blocks.index == states.U)[0])
+        variance = float(self._covariance(memory)[row, row])
+        width, left = second.update(x[states.WIDTH], memory.width_variance, memory.airspeed, ground, variance)
+        x = rescaled(x, width / x[states.WIDTH])
+        x[states.WIDTH] = width
+        return replace(memory, x=x, width_variance=left)
 
     def _predict_edges(self, x: Array, edges: EdgeSet, h: Array, Hx: Array) -> None:
         edge_model(
@@ -362,10 +400,6 @@ class RunwayEkf:
         share = memory.rejected + ((found - used) / found - memory.rejected) / c.watchdog_memory
         if share <= c.watchdog_share:
             return replace(memory, rejected=share)
-        P = memory.P if memory.D is None else kalman.ud_product(memory.P, memory.D)
-        P = P + np.diag(0.25 * self._prior[self.blocks.index])
+        P = self._covariance(memory) + np.diag(0.25 * self._prior[self.blocks.index])
         opened = replace(memory, rejected=0.0, frames=c.start_frames - 5, reinflated=16)
-        if memory.D is None:
-            return replace(opened, P=P)
-        U, D = kalman.ud_factor(P)
-        return replace(opened, P=U, D=D)
+        return self._with_covariance(opened, P)
