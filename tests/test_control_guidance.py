@@ -201,6 +201,19 @@ def test_touchdown_without_a_switch_needs_a_moment() -> None:
     assert modes == ["decrab", "rollout", "rollout", "rollout"]
 
 
+def test_a_bounce_is_flared_again_from_where_it_is() -> None:
+    guidance = LandingGuidance(SETTINGS)
+    memory = GuidanceMemory("rollout", t=0.0, seen=0.0)
+    memory, hop = guidance.step(memory, estimate(0.06, x=500.0, H=2.2, u=43.0, flags={"on_ground": False}))
+    assert hop.mode == "rollout"  # 0.4 m under the wheels: leave it
+    high = estimate(0.12, x=500.0, H=3.3, u=43.0, flags={"on_ground": False})
+    memory, hop = guidance.step(memory, high)
+    assert (hop.mode, hop.airspeed, hop.height) == ("decrab", 43.0, high["H"])
+    assert hop.climb_rate == pytest.approx(-43.0 * (1.5 + 3.0) / guidance.path.length)
+    memory, down = guidance.step(memory, estimate(0.18, x=560.0, H=1.8, u=43.0, flags={"on_ground": True}))
+    assert down.mode == "rollout"
+
+
 def test_long_blackout_goes_around_but_not_below_decision_height() -> None:
     guidance = LandingGuidance(SETTINGS)
     for x, expected in ((-400.0, "go_around"), (100.0, "flare")):

@@ -152,6 +152,9 @@ def test_a_gust_that_heading_is_not_corrected_for_is_not_taken_for_sideslip() ->
     e, r = in_trim(wy=3.0)
     assert abs(command(e, replace(r, extra={"crosswind": 0.0})).aileron) < 1e-3
     assert abs(command(e, r).aileron) > 0.2  # told nothing, it must believe that it slips by 3 m/s
+    trim = command(*in_trim()).elevator
+    e, r = in_trim(wz=-2.0)
+    assert command(e, replace(r, extra={"downdraught": 0.0})).elevator == pytest.approx(trim, abs=1e-3)
 
 
 def test_decrabbed_flight_is_a_steady_sideslip() -> None:

@@ -29,7 +29,8 @@ class GuidanceMemory:
     mode: str = "acquire"
     t: float = -math.inf  # [s] of the last step
     seen: float = -math.inf  # [s] when the estimate was last valid
-    crosswind: float = 0.0  # [m/s] smoothed
+    crosswind: float = 0.0  # [m/s] smoothed, R's y
+    downdraught: float = 0.0  # [m/s] smoothed, R's z
     waiting: float = 0.0  # [s] for how long touchdown or instability has been suspected
     bounced: bool = False  # airborne again after touchdown
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of a go-around: time [s], height [m], climb rate [m/s]
@@ -122,12 +123,14 @@ class LandingGuidance:
         dt = min(max(estimate.t - memory.t, 0.0), 1.0)
         share = dt / (dt + self.settings.decrab.wind_filter_s) if math.isfinite(memory.seen) else 1.0
         crosswind = memory.crosswind + share * (b.wy - memory.crosswind)
+        downdraught = memory.downdraught + share * (b.wz - memory.downdraught)
         started = mode == "go_around" and memory.mode != mode
         memory = GuidanceMemory(
             mode,
             estimate.t,
             estimate.t if estimate.valid else memory.seen,
             crosswind,
+            downdraught,
             waiting,
             memory.bounced or (memory.mode == "rollout" and mode == "decrab"),
             (estimate.t, b.H, m.H_dot) if started else memory.start,
@@ -170,7 +173,8 @@ class LandingGuidance:
             "acceleration": V_slope * m.x_dot,  # [m/s²] of the airspeed
             "pull": curvature * m.x_dot * m.x_dot,  # [m/s²] of the path, > 0 upwards
             "sideslip": aligned * crab,  # [rad]
-            "crosswind": memory.crosswind,  # [m/s] with which crab and sideslip are meant
+            "crosswind": memory.crosswind,  # [m/s] what crab and sideslip are meant for
+            "downdraught": memory.downdraught,  # [m/s] what pitch is to be corrected for
             "wheel_height": height,  # [m]
             "on_path": float(abs(H_path - height) < limit),
         }
@@ -187,7 +191,11 @@ class LandingGuidance:
         limit = self.settings.path.height_error_limit_m
         error = min(max(height - b.H, -limit), limit)
         crab = -memory.crosswind / max(m.airspeed, 0.5 * self.path.touchdown)
-        extra = {"pull": g.pull_mps2 if steady <= 0.0 else 0.0, "crosswind": memory.crosswind}
+        extra = {
+            "pull": g.pull_mps2 if steady <= 0.0 else 0.0,
+            "crosswind": memory.crosswind,
+            "downdraught": memory.downdraught,
+        }
         rate = climb if steady > 0.0 else rate + g.pull_mps2 * pulling
         return Reference("go_around", self.path.approach, b.H + error, rate, b.y, crab, 0.0, extra=extra)
 

@@ -115,10 +115,13 @@ class LandingController:
                 elevator0 += math.radians(interpolate(height, g.height_m, g.elevator_deg))
                 alpha += math.radians(interpolate(height, g.height_m, g.alpha_deg))
         # What the reference asks for: a flight path through the air, its curvature, a speed and its change.
-        path = (ref.climb_rate + b.wz) / V
+        wz = extra("downdraught", b.wz)
+        path = (ref.climb_rate + wz) / V
         q_ref = extra("pull", 0.0) / V
         e_u = m.u_air - ref.airspeed * math.cos(alpha)
-        e_w = m.w_air - ref.airspeed * math.sin(alpha) - w_pull * q_ref
+        # Gusts faster than the wind that attitude is corrected for must not be taken for angle of attack, nor below for
+        # sideslip: with attitude uncorrected, feedback of w and v is feedback of path and course.
+        e_w = m.w_air + (b.wz - wz) * math.cos(b.theta) * math.cos(b.phi) - ref.airspeed * math.sin(alpha) - w_pull * q_ref
         e_q = b.q - q_ref
         e_th = b.theta - (alpha + path + ref.theta_ff + w_pull * q_ref / V)
         e_H = b.H - ref.height
@@ -139,8 +142,6 @@ class LandingController:
         if abs(elevator) > self._limits[0][0] or not extra("on_path", 1.0):
             int_H = memory.int_H
         slip = V * extra("sideslip", 0.0)
-        # A gust faster than the crosswind that heading is corrected for must not be taken for sideslip: with heading
-        # gone uncorrected, feedback of v is feedback of course.
         e_v = m.v_air + (b.wy - extra("crosswind", b.wy)) * math.cos(b.psi) * math.cos(b.phi) - slip
         e_r = b.r - ref.r_ff
         e_ph = b.phi - ref.phi - ph_slip * slip

@@ -257,7 +257,10 @@ class CaptureSettings:
 
 @dataclass(frozen=True, slots=True)
 class DecrabSettings:
-    """Heading moves from crab to the runway's between these heights of the wheels, with the wing low that it takes."""
+    """Heading moves from crab to the runway's between these heights of the wheels, with the wing low that it takes.
+
+    Attitude is corrected for the wind smoothed over wind_filter_s, on the whole approach: gusts are faster.
+    """
 
     start_height_m: float
     end_height_m: float
