@@ -23,17 +23,19 @@ GUST = tuple(Run("do128/gust", seed=seed) for seed in SEEDS)
 SPLIT = tuple(Run("do128/gust", ("filter.kind=split", "filter.factorisation=ud"), seed) for seed in SEEDS)
 PLAIN = tuple(Run("do128/gust", ("filter.kind=plain", "filter.factorisation=ud"), seed) for seed in (1, 2))
 LEVEL_GUST = (Run("do128/gust", ("wind.gust.vertical_mps=0",)),)
-_COMMANDED = ("filter.kind=split", "filter.factorisation=ud", "vision.platform_angle=commanded")
-LAGGING = tuple(Run("do128/gust", (*_COMMANDED, "camera.platform.lag_s=0.08"), seed) for seed in (1, 2, 3))
-PROMPT = tuple(Run("do128/gust", (*_COMMANDED, "camera.platform.lag_s=0"), seed) for seed in (1, 2, 3))
+_STRAIGHT_IN = ("initial.y_m=0", "initial.heading_deg=0", "vision.platform_angle=commanded")
+_HALVES = ("filter.kind=split", "filter.factorisation=ud")
+LAGGING = tuple(Run("do128/calm", (*_STRAIGHT_IN, *_HALVES, "camera.platform.lag_s=0.1"), seed) for seed in (1, 2, 3))
+PROMPT = tuple(Run("do128/calm", (*_STRAIGHT_IN, *_HALVES, "camera.platform.lag_s=0"), seed) for seed in (1, 2, 3))
 WIDTH = tuple(
     Run("do128/gust", ("filter.width=separate", f"filter.believed_width_m={width}"), seed)
     for width, seed in ((25, 1), (33, 2), (25, 3), (33, 4))
 )
-BY_HAND = ("initial.y_m=-20", "initial.heading_deg=2", "wind.turbulence={severity: light}")
-PILOT = (
-    Run("do128/calm", (*BY_HAND, "filter.width=separate", "filter.believed_width_m=25"), 1, pilot=True),
-    Run("do128/calm", (*BY_HAND, "filter.width=separate", "filter.believed_width_m=33"), 2, pilot=True),
+_BY_HAND = ("initial.y_m=-20", "initial.heading_deg=2", "wind.turbulence={severity: light}")
+PILOT = tuple(Run("do128/calm", _BY_HAND, seed, pilot=True) for seed in (1, 2, 3))
+PILOT_WIDTH = tuple(
+    Run("do128/calm", (*_BY_HAND, "filter.width=separate", f"filter.believed_width_m={width}"), seed, pilot=True)
+    for width, seed in ((25, 1), (33, 2))
 )
 
 
@@ -50,32 +52,25 @@ def _gust(column: str, sign: float) -> Measure:
     """What the gust adds at its strike: the jump of the true wind there."""
 
     def jump(log: FlightLog) -> float:
-        at = int((log["true_x_m"] > m.GUST_X).argmax())
-        return float(sign * (log[column][at] - log[column][at - 1]))
+        behind = log["true_x_m"] > m.GUST_X
+        at = int(behind.argmax())
+        return float(sign * (log[column][at] - log[column][at - 1])) if behind.any() and at > 0 else math.nan
 
     return m.over(jump)
 
 
 def _gust_time(log: FlightLog) -> float:
     """Time constant of the decaying vertical wind, from its values 1 s and 7 s after the strike."""
-    t, down = log["t_s"], log["true_wz_mps"]
-    struck = float(t[(log["true_x_m"] > m.GUST_X).argmax()])
+    t, down, behind = log["t_s"], log["true_wz_mps"], log["true_x_m"] > m.GUST_X
+    struck = float(t[behind.argmax()]) if behind.any() else math.inf
+    if t[-1] < struck + 7.0:
+        return math.nan
     early, late = (float(down[(t >= struck + after).argmax()]) for after in (1.0, 7.0))
-    return 6.0 / math.log(early / late)
+    return 6.0 / math.log(early / late) if early * late > 0.0 and early != late else math.nan
 
 
 # fmt: off
 CLAIMS: tuple[Claim, ...] = (
-    _by_construction("start-range", "starts 950 m in front of the threshold", 950.0, "m", _first("true_x_m", -1.0), 1.0),
-    _by_construction("start-height", "starts at about 51 m", 51.0, "m", _first("true_H_m"), 0.5),
-    _by_construction("start-speed", "starts at 50 m/s", 50.0, "m/s", _first("true_airspeed_mps"), 0.5),
-    _by_construction("start-offset", "starts 85 m beside the centreline", 85.0, "m", _first("true_y_m", -1.0), 0.5),
-    _by_construction(
-        "start-heading", "starts 15 deg towards the centreline", 15.0, "deg", _first("true_psi_rad", m.DEGREES), 0.2
-    ),
-    _by_construction("gust-lateral", "gust with 2 m/s across at 650 m", 2.0, "m/s", _gust("true_wy_mps", -1.0), 0.1),
-    _by_construction("gust-vertical", "gust with 1 m/s vertical", 1.0, "m/s", _gust("true_wz_mps", -1.0), 0.1),
-    _by_construction("gust-time", "the gust decays with 6 s", 6.0, "s", m.over(_gust_time), 0.3),
     Claim(
         "range", "distance is estimated within 5 m while the threshold is visible", "7.1", 5.0, "m",
         "largest |range error| from 1.5 s after acquisition until the threshold is lost, at any distance",
@@ -99,15 +94,17 @@ CLAIMS: tuple[Claim, ...] = (
         "largest |height error| over the runway", GUST, m.worst("height_runway_m"), at_most(0.5),
     ),
     Claim(
-        "flare-onset", "a rather large height error at flare onset, from the delay of the tilt loop", "7.1", None, "times",
-        "jump of the height error within 3 s of flare onset: platform with 0.08 s lag over one without; filter in two "
-        "halves that takes the commanded angles for the true ones",
-        (*LAGGING, *PROMPT), m.onset_with_lag, at_least(2.0), "agrees if the lag at least doubles it",
+        "flare-onset", "a rather large height error at flare onset, from the delay of the tilt loop", "7.1", None, "m",
+        "growth of the largest |height error| from the second before to the 3 s after flare onset; straight-in approach, "
+        "filter in two halves that takes commanded platform angles for the true ones, platform with 0.1 s lag",
+        (*LAGGING, *PROMPT), m.onset_with_lag, at_least(0.3),
+        "rather large read as 0.3 m; what a tilt error shifts in our filter is pitch: height rests on the angle between "
+        "the borderlines",
     ),
     Claim(
-        "flare-onset-vanishes", "without the lag that error is gone", "7.1 (the cause it names)", 0.5, "m",
-        "jump of the height error within 3 s of flare onset, platform without lag",
-        PROMPT, m.over(m.onset_error), at_most(0.5),
+        "flare-onset-vanishes", "without the delay that error is gone", "7.1 (its cause)", None, "m",
+        "the same growth, platform without lag", PROMPT, m.over(m.onset_growth), at_most(0.1),
+        "gone read as 0.1 m",
     ),
     Claim(
         "vertical-gust", "the vertical gust is hardly noticeable in the trajectory", "7.1", None, "m",
@@ -215,10 +212,20 @@ CLAIMS: tuple[Claim, ...] = (
     ),
     Claim(
         "width-flight", "mean width 29.1 m (true 29 m) until 200 m from the threshold", "7.2, fig. 15", 29.1, "m",
-        "mean of the width estimate from 600 m until the threshold is lost; scripted pilot, light turbulence",
-        PILOT, m.over(m.width_mean, m.median, "median of"), about(29.1, 0.4),
+        "mean of the width estimate from 600 m until the threshold is lost; scripted pilot, light turbulence; told 25 m "
+        "or 33 m", PILOT_WIDTH, m.over(m.width_mean, m.farthest_from(29.0), "farthest of"), about(29.1, 0.4),
         "compared with our scripted pilot's approach; the paper's was a real flight",
     ),
+    _by_construction("start-range", "starts 950 m in front of the threshold", 950.0, "m", _first("true_x_m", -1.0), 1.0),
+    _by_construction("start-height", "starts at about 51 m", 51.0, "m", _first("true_H_m"), 0.5),
+    _by_construction("start-speed", "starts at 50 m/s", 50.0, "m/s", _first("true_airspeed_mps"), 0.5),
+    _by_construction("start-offset", "starts 85 m beside the centreline", 85.0, "m", _first("true_y_m", -1.0), 0.5),
+    _by_construction(
+        "start-heading", "starts 15 deg towards the centreline", 15.0, "deg", _first("true_psi_rad", m.DEGREES), 0.2
+    ),
+    _by_construction("gust-lateral", "gust with 2 m/s across at 650 m", 2.0, "m/s", _gust("true_wy_mps", -1.0), 0.1),
+    _by_construction("gust-vertical", "gust with 1 m/s vertical", 1.0, "m/s", _gust("true_wz_mps", -1.0), 0.1),
+    _by_construction("gust-time", "the gust decays with 6 s", 6.0, "s", m.over(_gust_time), 0.3),
     Claim(
         "flight-hardware", "the flight hardware (BVV 2, platform, aircraft) works in five days of testing", "7.2, 8",
         None, "", "nothing: a simulation has no such hardware", (), lambda flown: m.NOTHING, None,

@@ -35,7 +35,8 @@ STYLE = {
     "xtick.color": "#5c677d",
     "ytick.color": "#5c677d",
     "lines.linewidth": 1.5,
-    "legend.frameon": False,
+    "legend.edgecolor": "none",
+    "legend.framealpha": 0.85,
     "legend.fontsize": 8.5,
     "svg.fonttype": "none",
     "svg.hashsalt": "landing-sim",
@@ -45,6 +46,8 @@ DISTANCE = "distance to the threshold x [m]"
 
 @dataclass(frozen=True, slots=True)
 class Figure:
+    """One of the paper's figures, redrawn."""
+
     number: str
     title: str
     svg: str
@@ -53,24 +56,18 @@ class Figure:
 
 def figures(flown: Mapping[Run, Flown]) -> list[Figure]:
     """Every figure. Raises KeyError if a flight is missing."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
     gust, split, pilot = (flown[runs[0]].log for runs in (paper.GUST, paper.SPLIT, paper.PILOT))
-    with plt.rc_context(STYLE):
-        return [
-            _trajectory(gust),
-            _angle(gust, "9", "Roll angle", "phi", m.DEGREES, "deg", 1.0, 8.0),
-            _angle(gust, "10", "Yaw angle", "psi", m.DEGREES, "deg", 1.0, 2.0),
-            _lateral(gust, split),
-            _range_and_height(gust, split, flown),
-            _against_gps(pilot, "12", "Distance to the runway, flown by hand", "x", "dgps_x_m"),
-            _against_gps(pilot, "13", "Lateral offset, flown by hand", "y", "dgps_y_m"),
-            _altitude(pilot),
-            _width([flown[run].log for run in paper.PILOT]),
-        ]
+    return [
+        _trajectory(gust),
+        _angle(gust, "9", "Roll angle", "phi", m.DEGREES, "deg", 1.0, 8.0),
+        _angle(gust, "10", "Yaw angle", "psi", m.DEGREES, "deg", 1.0, 2.0),
+        _lateral(gust, split),
+        _range_and_height(gust, flown),
+        _against_gps(pilot, "12", "Distance to the runway, flown by hand", "x", "dgps_x_m"),
+        _against_gps(pilot, "13", "Lateral offset, flown by hand", "y", "dgps_y_m"),
+        _altitude(pilot),
+        _width([flown[run].log for run in paper.PILOT_WIDTH]),
+    ]
 
 
 def _trajectory(log: FlightLog) -> Figure:
@@ -82,7 +79,7 @@ def _trajectory(log: FlightLog) -> Figure:
         top.plot(x, log["true_y_m"], color=TRUE, label="flown")
         top.plot(log.truth("x"), log.estimate("y"), color=ESTIMATED, ls="--", lw=1.0, label="estimated")
         top.axvline(m.GUST_X, color=OTHER, ls=":", lw=1)
-        top.annotate("gust", (m.GUST_X, 0.0), (4, 14), textcoords="offset points", color="#5c677d", fontsize=8.5)
+        top.annotate("gust", (m.GUST_X, -80.0), (4, 0), textcoords="offset points", color="#5c677d", fontsize=8.5)
         top.set(xlabel=DISTANCE, ylabel="y [m]", title="from above", xlim=(-1000, 900))
         top.invert_yaxis()
         top.legend(loc="lower right")
@@ -121,7 +118,7 @@ def _angle(
         _errors(difference, x[use], error[use], sigma[use], claim, unit)
         difference.set(title=f"{number}b  difference")
 
-    largest = float(np.abs(error[use]).max())
+    largest = m.largest(error, use)
     caption = (
         f"Largest difference {largest:.2g} {unit} where the paper stays within {claim:g} {unit}; the band is the filter's "
         "own 3-sigma."
@@ -155,7 +152,7 @@ def _lateral(gust: FlightLog, split: FlightLog) -> Figure:
     return Figure("11", "Lateral offset", _svg(draw, 2), caption)
 
 
-def _range_and_height(gust: FlightLog, split: FlightLog, flown: Mapping[Run, Flown]) -> Figure:
+def _range_and_height(gust: FlightLog, flown: Mapping[Run, Flown]) -> Figure:
     lagging, prompt = flown[paper.LAGGING[0]].log, flown[paper.PROMPT[0]].log
 
     def draw(axes: Any) -> None:
@@ -165,9 +162,9 @@ def _range_and_height(gust: FlightLog, split: FlightLog, flown: Mapping[Run, Flo
         distance.axvline(-120.0, color=OTHER, ls=":", lw=1)
         distance.set(title="range error; dotted: threshold lost (paper)", ylim=(-12, 12))
         for log, colour, text in (
-            (lagging, OTHER, "angles as commanded, platform with lag"),
-            (prompt, TRUE, "angles as commanded, platform without lag"),
-            (gust, ESTIMATED, "angles from encoders"),
+            (lagging, OTHER, "straight in, commanded angles, platform with lag"),
+            (prompt, TRUE, "the same, without lag"),
+            (gust, ESTIMATED, "the paper's case, angles from encoders"),
         ):
             u = counted(log)
             height.plot(log["true_x_m"][u], log.error("H")[u], color=colour, lw=1.2, label=text)
@@ -180,7 +177,8 @@ def _range_and_height(gust: FlightLog, split: FlightLog, flown: Mapping[Run, Flo
 
     caption = (
         "Text of section 7.1, drawn: range within 5 m until the threshold is lost, then only predicted (the band opens). "
-        "Height errors with a camera platform whose lag the filter does not know of, and without."
+        "A platform lag that the filter does not know of shows little in height: that rests on the angle between the "
+        "borderlines, which tilt does not change."
     )
     return Figure("7.1", "Range and height errors", _svg(draw, 2), caption)
 
@@ -255,6 +253,15 @@ def _errors(axes: Any, x: Array, error: Array, sigma: Array, claim: float, unit:
         axes.axhline(sign * claim, color=CLAIM, ls="--", lw=1, label=f"paper: {claim:g} {unit}" if sign > 0 else None)
     axes.set(xlabel=DISTANCE, ylabel=f"error [{unit}]", ylim=(-1.6 * claim, 1.6 * claim))
     axes.legend(loc="upper right")
+    largest = m.largest(error, np.ones(len(error), bool))
+    if largest < 0.2 * claim:
+        zoom = axes.inset_axes((0.1, 0.07, 0.88, 0.25))
+        zoom.fill_between(x, -3.0 * sigma, 3.0 * sigma, color=BAND, lw=0)
+        zoom.plot(x, error, color=ESTIMATED, lw=0.9)
+        span = 1.2 * max(largest, 3.0 * float(np.median(sigma)))
+        zoom.set(ylim=(-span, span), xticklabels=[])
+        zoom.tick_params(labelsize=7.5, length=2)
+        zoom.set_title("enlarged", fontsize=8, color="#5c677d", pad=2)
 
 
 def _end(log: FlightLog) -> float:
@@ -263,12 +270,16 @@ def _end(log: FlightLog) -> float:
 
 
 def _svg(draw: Callable[[Any], None], columns: int) -> str:
+    import matplotlib
+
+    matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(1, columns, layout="constrained")
-    draw(axes)
     out = io.StringIO()
-    figure.savefig(out, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
-    plt.close(figure)
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(1, columns, layout="constrained")
+        draw(axes)
+        figure.savefig(out, format="svg", facecolor="white", metadata={"Date": None, "Creator": None})
+        plt.close(figure)
     text = out.getvalue()
     return text[text.index("<svg") :]

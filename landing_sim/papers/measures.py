@@ -21,6 +21,14 @@ def median(values: Array) -> float:
     return float(np.median(values))
 
 
+def rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else math.nan
+
+
+def farthest_from(value: float) -> Callable[[Array], float]:
+    return lambda values: float(values[np.argmax(np.abs(values - value))])
+
+
 NOTHING = Measured(math.nan)
 
 
@@ -42,6 +50,9 @@ def over(
 
     def measured(flown: Sequence[Flown]) -> Measured:
         values = np.array([figure(f.log) for f in flown])
+        if not np.isfinite(values).all():
+            failed = int((~np.isfinite(values)).sum())
+            return Measured(math.nan, f"{failed} of {len(values)} flights ended before it could be measured")
         spread = f"{np.min(values):.3g} … {np.max(values):.3g}, median {median(values):.3g}"
         return Measured(of(values), f"{told} {len(values)} flights ({spread})" if len(values) > 1 else "one flight")
 
@@ -79,13 +90,10 @@ def lateral_otherwise(log: FlightLog) -> float:
     return largest(log.error("y"), counted(log) & ~in_gust(log))
 
 
-def onset_error(log: FlightLog) -> float:
-    """Largest height error within 3 s of the beginning flare, less what it was in the second before."""
-    t = log["t_s"]
-    start = flare_time(log)
-    H = log.error("H")
-    before = H[(t > start - 1.0) & (t <= start)]
-    return largest(H - np.mean(before), (t > start) & (t < start + 3.0)) if len(before) else math.nan
+def onset_growth(log: FlightLog, name: str = "H") -> float:
+    """How much larger |error| gets in the 3 s after the beginning of the flare than in the second before."""
+    t, start, error = log["t_s"], flare_time(log), log.error(name)
+    return largest(error, (t > start) & (t < start + 3.0)) - largest(error, (t > start - 1.0) & (t <= start))
 
 
 def flare_time(log: FlightLog) -> float:
@@ -136,11 +144,16 @@ def vertical_gust_effect(flown: Sequence[Flown]) -> Measured:
 
 
 def onset_with_lag(flown: Sequence[Flown]) -> Measured:
+    """Of the first half of the flights, with the lag; the note holds the second half, without, and pitch."""
     half = len(flown) // 2
-    slow, quick = (np.array([onset_error(f.log) for f in part]) for part in (flown[:half], flown[half:]))
-    return Measured(
-        float(np.median(slow) / np.median(quick)), f"{np.median(slow):.2f} m against {np.median(quick):.2f} m"
+    H, theta = (
+        [[onset_growth(f.log, name) for f in part] for part in (flown[:half], flown[half:])] for name in ("H", "theta")
     )
+    pitch = [DEGREES * float(np.median(part)) for part in theta]
+    text = (
+        f"without lag {np.median(H[1]):.3f} m; pitch error grows by {pitch[0]:.3f} deg, without lag {pitch[1]:.3f} deg"
+    )
+    return Measured(float(np.median(H[0])), text)
 
 
 def cycle_cost(flown: Sequence[Flown]) -> Measured:
@@ -149,6 +162,7 @@ def cycle_cost(flown: Sequence[Flown]) -> Measured:
 
 
 def split_cost(flown: Sequence[Flown]) -> Measured:
+    """Work of the split filter for each half, in percent of the full one's."""
     half = len(flown) // 2
     split, whole = (float(np.median([f.estimator_ms for f in part])) for part in (flown[:half], flown[half:]))
     text = f"filter of two halves {split:.3f} ms, whole filter {whole:.3f} ms a cycle"
@@ -160,9 +174,9 @@ def lateral_sharpens(flown: Sequence[Flown]) -> Measured:
     far, near = [], []
     for f in flown:
         error, x, use = f.log.error("y"), f.log["true_x_m"], counted(f.log)
-        far.append(float(np.sqrt(np.mean(error[use & (x < -600.0)] ** 2))))
-        near.append(float(np.sqrt(np.mean(error[use & (x > -300.0) & (x < 0.0)] ** 2))))
-    text = f"rms {np.median(far):.2f} m beyond 600 m, {np.median(near):.2f} m within 300 m"
+        far.append(rms(error[use & (x < -600.0)]))
+        near.append(rms(error[use & (x > -300.0) & (x < 0.0)]))
+    text = f"rms {np.median(far):.3f} m beyond 600 m, {np.median(near):.3f} m within 300 m"
     return Measured(float(np.median(far) / np.median(near)), text)
 
 
@@ -172,9 +186,11 @@ def optical_minus(log: FlightLog, name: str, column: str) -> Array:
 
 
 def rms_difference(name: str, column: str) -> Measure:
+    """The rms difference between an estimate and a reference system's readings on approach."""
+
     def of_flight(log: FlightLog) -> float:
         difference = optical_minus(log, name, column)
         use = counted(log) & np.isfinite(difference) & (log.truth("x") < 0.0)
-        return float(np.sqrt(np.mean(difference[use] ** 2))) if use.any() else math.nan
+        return rms(difference[use])
 
     return over(of_flight, of=median, told="median of")

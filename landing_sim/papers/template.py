@@ -11,7 +11,8 @@ TEMPLATE = """<!doctype html>
 <style>
 :root { --ink: #1d2433; --soft: #5c677d; --line: #e3e7ee; --good: #2d6a4f; --bad: #b23a2e; --none: #6c757d; }
 * { box-sizing: border-box; }
-body { margin: 0; background: #f4f6f9; color: var(--ink); font: 15px/1.5 system-ui, "Segoe UI", Helvetica, Arial, sans-serif; }
+body { margin: 0; background: #f4f6f9; color: var(--ink);
+  font: 15px/1.5 system-ui, "Segoe UI", Helvetica, Arial, sans-serif; }
 main { max-width: 1120px; margin: 0 auto; padding: 36px 24px 64px; }
 h1 { font-size: 27px; line-height: 1.25; margin: 0 0 6px; font-weight: 650; }
 h2 { font-size: 19px; margin: 44px 0 12px; font-weight: 650; }
@@ -90,7 +91,10 @@ acquired until touchdown.</p>
 {% endfor %}
 </table>
 </div>
-<p class="lead" style="margin-top: 16px">{% for package, version in versions.items() %}{{ package }} {{ version }}{{ ", " if not loop.last }}{% endfor %}</p>
+<p class="lead" style="margin-top: 16px">
+{% for package, version in versions.items() %}{{ package }} {{ version }}{{ ", " if not loop.last }}
+{% endfor %}
+</p>
 </main>
 </body>
 </html>
