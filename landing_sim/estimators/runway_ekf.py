@@ -21,7 +21,7 @@ from landing_sim.estimators.aircraft_model import downwash, parameters, propagat
 from landing_sim.estimators.belief import AircraftBelief
 from landing_sim.estimators.edge_model import edge_model
 from landing_sim.estimators.inertial_model import airspeed_model, gyro_model
-from landing_sim.estimators.width import Scaled, WidthFilter, rescaled
+from landing_sim.estimators.width import WidthFilter, rescaled
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.signals import Command, EdgeSet, Estimate, Feature, Measurement, Residuals, Status
 from landing_sim.types import Array
@@ -126,7 +126,6 @@ class RunwayEkf:
         self.config = config
         self.blocks = Blocks.of(config)
         self.names = tuple(states.NAMES[i] for i in self.blocks.index)
-        self._scaled = Scaled(self.blocks.index) if config.width == "state" else None
         self._width_filter = WidthFilter(config.airspeed_sigma) if config.width == "separate" else None
         if self._width_filter is not None:
             self.names = (*self.names, "W")
@@ -266,6 +265,11 @@ class RunwayEkf:
                 for error in errors:
                     P[angle, angle] += var[error]
                     P[angle, error] = P[error, angle] = var[error]
+        if c.width == "state":  # the acquired lengths hold for the width they were acquired with
+            scale = np.zeros(states.N)
+            scale[[states.X, states.Y, states.H]] = m.z[:3] / x[states.WIDTH]
+            scale[states.WIDTH] = 1.0
+            P += var[states.WIDTH] * (np.outer(scale, scale) - np.diag(scale == 1.0))
         P = P[np.ix_(idx, idx)]
         for lo, hi in zip(self.blocks.starts, self.blocks.starts[1:]):
             P[lo:hi, :lo] = 0.0
@@ -314,9 +318,7 @@ class RunwayEkf:
             return P, None, dx, nis
         return kalman.update_ud(memory.P.copy(), memory.D.copy(), Hn, R, nu, use, self.blocks.starts)
 
-    def _moved(self, x: Array, dx: Array, scaled: Scaled | None = None) -> Array:
-        if scaled is not None:
-            return scaled.moved(x, dx, self.blocks.index)
+    def _moved(self, x: Array, dx: Array) -> Array:
         out = x.copy()
         out[self.blocks.index] += dx
         return out
@@ -334,10 +336,6 @@ class RunwayEkf:
         innovation: Array | None = None
         status = edges.status.copy()
         use = found
-        prior = memory
-        if self._scaled is not None:
-            T_inverse = self._scaled.inverse(x)
-            prior = self._with_covariance(memory, T_inverse @ self._covariance(memory) @ T_inverse.T)
         for i in range(c.start_iterations if starting else 1):
             self._predict_edges(x, edges, h, Hx)
             Hn = np.ascontiguousarray(Hx[:, self.blocks.index])
@@ -349,22 +347,19 @@ class RunwayEkf:
                     s = kalman.innovation_variance(self._covariance(memory), Hn, R)
                     use &= nu * nu <= c.gate_sigma**2 * s
                     status[found & ~use] = Status.REJECTED
-            if self._scaled is not None:
-                Hn = Hn @ self._scaled.matrix(x)
             nu = nu + Hn @ step
             R_used = R
             if starting:  # Huber: an edge far off at the current iterate counts less
                 sd = np.sqrt(R) * c.huber
                 R_used = R * np.maximum(1.0, np.abs(m.z - h) / sd, where=found, out=np.ones(n))
-            P_new, D_new, step, nis = self._kalman(prior, Hn, R_used, nu, use)
-            x = self._moved(memory.x, step, self._scaled)
+            P_new, D_new, step, nis = self._kalman(memory, Hn, R_used, nu, use)
+            x = self._moved(memory.x, step)
         dof = int(use.sum())
-        updated = replace(memory, x=x, P=P_new, D=D_new)
-        if self._scaled is not None:
-            T = self._scaled.matrix(x)
-            updated = self._with_covariance(updated, T @ self._covariance(updated) @ T.T)
         after = replace(
-            updated,
+            memory,
+            x=x,
+            P=P_new,
+            D=D_new,
             frames=memory.frames + 1,
             misses=0 if dof else memory.misses + 1,
             threshold_in_view=bool(np.any(use & (edges.feature == Feature.THRESHOLD))),

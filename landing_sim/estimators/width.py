@@ -3,8 +3,7 @@
 What gives the scale is speed: on a runway believed too wide the aircraft seems to move faster over the ground than the air
 data say. That holds without wind along the track; a headwind looks like a wider runway, W / W_true = V_air / V_ground.
 
-Two ways: W as a state of the filter, updated in coordinates in which that ambiguity is linear (`Scaled`), or a second,
-scalar filter beside it (`WidthFilter`), as in the paper.
+Two ways: W as a state of the filter, or a second, scalar filter beside it (`WidthFilter`), as in the paper.
 
 Source     Dickmanns & Schell 1992, section 7.1 ("another Kalman filter for runway width estimation"; it is stopped when
            the threshold is lost). The paper does not give its equations; these are ours.
@@ -20,7 +19,7 @@ import numpy as np
 from landing_sim.estimators import states
 from landing_sim.types import Array
 
-LENGTHS = [states.X, states.Y, states.H]  # what scales with the width in the image
+SCALED = [states.U, states.V, states.W, states.X, states.Y, states.H]  # what grows with the width, seen in images alone
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,48 +50,9 @@ def rescaled(x: Array, factor: float) -> Array:
     x (23,); the wind along the way takes up the difference in speed.
     """
     out = x.copy()
-    out[LENGTHS] *= factor
+    out[SCALED] *= factor
     grown = (factor - 1.0) * x[states.U : states.W + 1]
-    out[states.U : states.W + 1] += grown
     # along track only, to first order in the (small) attitude
     out[states.WX] += grown[0] * math.cos(x[states.PSI])
     out[states.WY] += grown[0] * math.sin(x[states.PSI])
     return out
-
-
-class Scaled:
-    """Covariance in the coordinates (x/W, y/W, H/W, W): edges fix the ratios, nothing but speed fixes W.
-
-    A filter in plain coordinates relinearises this ambiguity at every image, gains information that is not there, and
-    stops too early on a wrong width. index : states of the covariance's rows, W among them.
-    """
-
-    def __init__(self, index: np.ndarray) -> None:
-        self._rows = np.array([int(np.flatnonzero(index == s)[0]) for s in LENGTHS])
-        self._w = int(np.flatnonzero(index == states.WIDTH)[0])
-        self._n = len(index)
-
-    def matrix(self, x: Array) -> Array:
-        """T (n, n) = d(plain)/d(scaled) at x (23,)."""
-        T = np.eye(self._n)
-        W = x[states.WIDTH]
-        T[self._rows, self._rows] = W
-        T[self._rows, self._w] = x[LENGTHS] / W
-        return T
-
-    def inverse(self, x: Array) -> Array:
-        """T^-1."""
-        T = np.eye(self._n)
-        W = x[states.WIDTH]
-        T[self._rows, self._rows] = 1.0 / W
-        T[self._rows, self._w] = -x[LENGTHS] / (W * W)
-        return T
-
-    def moved(self, x: Array, dx: Array, index: np.ndarray) -> Array:
-        """x after a step dx (n,) in scaled coordinates."""
-        out = x.copy()
-        out[index] += dx
-        W = max(out[states.WIDTH], 1.0)
-        out[states.WIDTH] = W
-        out[LENGTHS] = (x[LENGTHS] / x[states.WIDTH] + dx[self._rows]) * W
-        return out
