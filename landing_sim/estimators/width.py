@@ -14,8 +14,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from landing_sim.estimators import states
 from landing_sim.types import Array
 
