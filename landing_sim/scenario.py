@@ -177,6 +177,9 @@ class Vision(Section):
         description="windows on left, right borderline, threshold, horizon; a lost threshold's move to the borderlines",
     )
     platform_angle: Literal["encoder", "commanded"] = Field("encoder", description="which platform angles are believed")
+    edge_floor_px: float = Field(
+        0.01, ge=0, le=5, description="1 sigma added to what noise makes an edge uncertain by: 0.5 is the trust of 1992"
+    )
 
 
 class Filter(Section):

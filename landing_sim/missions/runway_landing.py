@@ -35,6 +35,7 @@ from landing_sim.signals import Feature, Step, Touchdown
 from landing_sim.vehicle import Vehicle
 from landing_sim.vision.believed import BelievedCamera, RunwayMap, TaxiwayMouth
 from landing_sim.vision.front_end import FrontEndConfig, RunwayFrontEnd
+from landing_sim.vision.windows import EdgeConfig
 from landing_sim.world.dryden import W20, Turbulence
 from landing_sim.world.runway import Greys, Runway, Taxiway
 from landing_sim.world.wind import CrosswindStep, ExponentialGust, SteadyWind, Wind, WindConfig
@@ -290,7 +291,7 @@ def _front_ends(scenario: Scenario, camera: BelievedCamera, noise: Noise) -> dic
             if wanted.mapped
         ),
     )
-    front_end = RunwayFrontEnd(known, camera, FrontEndConfig(v.windows, v.platform_angle))
+    front_end = RunwayFrontEnd(known, camera, FrontEndConfig(v.windows, v.platform_angle, edges=EdgeConfig(floor=v.edge_floor_px)))
     return {
         "camera": front_end,
         "gyro": Reading("gyro", "gyro", math.radians(max(s.gyro.noise_dps, 0.01))),
