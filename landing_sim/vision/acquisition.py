@@ -35,8 +35,10 @@ class AcquisitionConfig:
 
     edge_snr of an edge point; max_roll, max_heading [rad] of the camera against the horizon and of the runway against the
     optical axis; heights and range [m] of the camera over and from the threshold; horizon_share of the image's width that
-    it must span; min_points of each border, geometric mean; max_residual: rms of the final residuals over their standard
-    deviations; max_contrast_ratio between the runway's three edges; hypotheses: pairs of borderlines tried, best first.
+    it must span; min_points of each border, geometric mean; min_depth_spread: standard deviation over mean of its
+    points' depths below the horizon; max_side: distance of a border to the side of the camera over the height;
+    max_residual: rms of the final residuals over their standard deviations; max_contrast_ratio between the runway's three
+    edges; hypotheses: pairs of borderlines tried, best first.
     """
 
     edge_snr: float = 4.5
@@ -47,9 +49,11 @@ class AcquisitionConfig:
     max_range: float = 3000.0
     horizon_share: float = 0.5
     min_points: float = 12.0
+    min_depth_spread: float = 0.11
+    max_side: float = 7.5
     max_residual: float = 4.0
     max_contrast_ratio: float = 2.2
-    hypotheses: int = 4
+    hypotheses: int = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,13 +122,13 @@ class Acquisition:
         """R_LC, heading, K_left, K_right of the best pair of borderlines not yet tried; see `borders`."""
         c, width = self._config, self._runway.width
         polarity = 1.0 if self._runway.brighter else -1.0
-        limits = width / c.max_height, width / c.min_height
+        limits = np.array([width / c.max_height, width / c.min_height, c.max_side, c.min_depth_spread])
         step, height = 2.0 / self._lens[0], 30.0  # the height only bends the first horizon, by 3 mrad
         headings = np.arange(-c.max_heading, c.max_heading, step)
         for _ in range(2):
             R_LC = level_from_horizon(a, b, self._lens, horizon_dip(height))
             score, heading, k_left, k_right = borders(
-                below, R_LC, self._lens, self._runway.slope, polarity, headings, *limits, tried
+                below, R_LC, self._lens, self._runway.slope, polarity, headings, limits, tried
             )
             if score < c.min_points:
                 return None
@@ -150,18 +154,21 @@ class Acquisition:
         p_RB = np.array([x, y, z]) - R_RB @ np.array(self._camera.p_BC)
         return self._fine(sample, np.array([p_RB[0], p_RB[1], -p_RB[2], *to_euler(R_RB)]), pan, tilt)
 
-    def _threshold(self, image: np.ndarray, R_RC: Array, height: float, y: float) -> tuple[float, Array, float] | None:
+    def _threshold(
+        self, image: np.ndarray, R_RC: Array, height: float, y: float
+    ) -> tuple[float, Array, float, float] | None:
         """Where the strips free of paint begin, seen from `height` [m] above the runway's surface, y [m] off its middle.
 
-        Returns the distance [m] ahead of the camera along the runway, the threshold centre's pixel (2,) and the variance
-        [px^2] of its place along the runway's image; None if there is no such edge.
+        Returns the distance [m] ahead of the camera along the runway, the threshold centre's pixel (2,), the variance
+        [px^2] of its place along the runway's image, and its contrast [grey levels]; None if there is no such edge.
         """
         slope, f = self._runway.slope, self._lens[0]
         cs, ss = math.cos(slope), math.sin(slope)
         R_CD = R_RC.T @ np.array([[cs, 0.0, ss], [0.0, 1.0, 0.0], [-ss, 0.0, cs]])  # D: along, right, down normal
         stripes = self._runway.stripes
         strips = clean_strips(self._runway.width, stripes.outermost, stripes.gap)
-        offsets = np.concatenate([s[0] + (s[1] - s[0]) * np.linspace(0.25, 0.75, 5) for s in strips]) - y
+        # clear of the stripes, and of the centre line in the middle one
+        offsets = np.concatenate([s[0] + (s[1] - s[0]) * np.array([0.25, 0.35, 0.65, 0.75]) for s in strips]) - y
         scale = height * f  # pixels below the horizon, times metres
         nearest = 1.0 / max(10.0, 2.0 * height)
         farthest = max(1.0 / self._config.max_range, (horizon_dip(height) + 8.0 / f) / height)
@@ -173,15 +180,27 @@ class Acquisition:
         response[3:-3] = np.correlate(g, mask) * (1.0 if self._runway.brighter else -1.0)
         response[np.isnan(response)] = -np.inf
         k = int(np.argmax(response[1:-1])) + 1
-        before, peak, after = response[k - 1 : k + 2]
+        less, peak, more = response[k - 1 : k + 2]
         independent = 0.6 * len(offsets)  # neighbouring lines share pixels
         noise = self._camera.noise / math.sqrt(independent)
-        if not (peak > max(3.0, 3.2 * noise * math.sqrt(2.0 / 3.0)) and np.isfinite(before + after)):
+        if not (peak > max(3.0, 2.8 * noise * math.sqrt(2.0 / 3.0)) and np.isfinite(less + more)):
             return None
-        rho = nearest - (k + 0.5 * (after - before) / (2.0 * peak - after - before)) / scale
+        # open ground in front of the threshold, and on either side of what lies behind it
+        rho = nearest - k / scale
+        end = min(k + 40, len(g), int(scale * (nearest - rho / (1.0 + rho * self._runway.length))))
+        for side in (-1.0, 1.0):
+            lines = side * np.array([0.65, 0.75]) * self._runway.width - y
+            rise = g[:end] - depth_profile(image, R_CD, self._lens, height, lines, nearest, end)
+            before, behind = rise[max(0, k - 40) : max(0, k - 4)], rise[k + 4 :]
+            before, behind = before[np.isfinite(before)], behind[np.isfinite(behind)]
+            if len(before) and abs(np.mean(before)) > 0.5 * peak:
+                return None
+            if len(behind) and abs(np.mean(behind)) < 0.4 * peak:
+                return None
+        rho = nearest - (k + 0.5 * (more - less) / (2.0 * peak - more - less)) / scale
         ray = R_CD @ np.array([1.0, -rho * y, rho * height])
         uv = self._lens[1:] + f * ray[:2] / ray[2]
-        return 1.0 / rho, uv, 3.5 * (noise / peak) ** 2 + _PROFILE_BIAS**2
+        return 1.0 / rho, uv, 3.5 * (noise / peak) ** 2 + _PROFILE_BIAS**2, peak
 
     def _fine(self, sample: CameraSample, pose: Array, pan: float, tilt: float) -> Acquired:
         """Gauss-Newton with Huber weights on windows placed along the predicted lines, search narrowing."""
@@ -234,16 +253,15 @@ class Acquisition:
         found = self._threshold(sample.frame.full(), R_CR.T, height, p_RC[1])
         if found is None:
             return seen
-        _, uv, variance = found
+        _, uv, variance, contrast = found
         along = self._lens[0] * R_CR[:2, 0] - (uv - self._lens[1:]) * R_CR[2, 0]  # image of the runway's direction
-        borders = seen.contrast[seen.feature <= Feature.RIGHT]
         return _Seen(
             np.append(seen.feature, int(Feature.THRESHOLD)),
             np.vstack([seen.centre, uv]),
             np.vstack([seen.direction, along / np.linalg.norm(along)]),
             np.append(seen.z, 0.0),
             np.append(seen.variance, variance),
-            np.append(seen.contrast, np.median(borders) if len(borders) else 0.0),
+            np.append(seen.contrast, contrast),
         )
 
     def _encoder_covariance(self, pose: Array, pan: float, tilt: float) -> Array:

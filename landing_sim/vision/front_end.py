@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -60,7 +61,10 @@ class RunwayFrontEnd:
         self._sight_of: Array = np.empty((9, 0))
 
     def process(self, sample: Sample, estimate: Estimate) -> tuple[Measurement, ...]:
-        """`estimate` at sample.t_valid. Raises ValueError for an estimate that lacks one of x, y, H, phi, theta, psi."""
+        """`estimate` at sample.t_valid.
+
+        Raises ValueError for an estimate that is not finite or lacks one of x, y, H, phi, theta, psi.
+        """
         data: CameraSample = sample.data
         pan, tilt = (data.pan, data.tilt) if self._encoder else (data.pan_cmd, data.tilt_cmd)
         if not estimate.valid or estimate.flags.get("lost", False):
@@ -77,6 +81,8 @@ class RunwayFrontEnd:
         sight[TILT] += tilt
         if sight[WIDTH] == 0.0:  # not among what is estimated
             sight[WIDTH] = self._width
+        if not math.isfinite(sight.sum()):
+            raise ValueError(f"camera front end: the estimate at t = {estimate.t} s is not finite: {sight.tolist()}")
         cov = self._unknown if estimate.cov is None else T @ estimate.cov @ T.T
         w = self._planner.place(sight, cov, self._counts)
         z, variance, _, status = self._planner.measure(data.frame, w)

@@ -128,8 +128,7 @@ def borders(
     slope: float,
     polarity: float,
     headings: Array,
-    k_min: float,
-    k_max: float,
+    limits: Array,
     tried: Array,
 ) -> tuple[float, float, float, float]:
     """score, heading [rad], K_left, K_right of the pair of lines that looks most like a runway's borders.
@@ -138,14 +137,17 @@ def borders(
     line along it, b to the right and h below the camera (normal to its surface), is the set of rays with b / h = K. For
     each heading tried the edge points are sorted by the direction K in which they lie from the vanishing point, in bins as
     wide as an edge is at their mean distance from it, and by whether brightness rises with K; the left border is
-    a rising one (polarity +1), the right border a falling one, k_min <= K_right - K_left <= k_max. Score: the geometric
-    mean of the numbers of points of both. Pairs like one of the rows heading, K_left, K_right of `tried` are passed over.
+    a rising one (polarity +1), the right border a falling one. Score: the geometric mean of the numbers of points of both.
+
+    limits (4,): K_right - K_left at least and at most; |K| at most; standard deviation over mean of the depth of a border's
+    points below the horizon at least, which lines across the runway do not reach. Pairs like one of the rows heading,
+    K_left, K_right of `tried` are passed over.
     """
     n = len(points)
-    rising, falling = np.zeros(_BINS + 2), np.zeros(_BINS + 2)
+    sums = np.zeros((2, 3, _BINS + 2))  # by polarity and bin: number of points, sum of depths and of their squares
     best, heading, left, right = 0.0, 0.0, 0.0, 0.0
     cs, ss = math.cos(slope), math.sin(slope)
-    where = np.empty(n)
+    where, depth = np.empty(n), np.empty(n)
     y, w = np.empty(3), np.empty(3)
     for t in range(len(headings)):
         ca, sa = math.cos(headings[t]), math.sin(headings[t])
@@ -166,37 +168,53 @@ def borders(
                 continue
             # p / (|p| + q) grows with K from -1 to 1; falling edges are set off by 3
             where[i] = p / (abs(p) + q) + (1.0 if along * polarity > 0.0 else 4.0)
+            depth[i] = q
             total += math.sqrt(p * p + q * q)
             m += 1
         if m == 0:
             continue
         bins = min(_BINS, max(90, int(2.0 * lens[0] * total / m / _BIN)))
-        rising[: bins + 2] = 0.0
-        falling[: bins + 2] = 0.0
+        sums[:, :, : bins + 2] = 0.0
         for i in range(n):
-            if where[i] < 2.0:
-                rising[int(0.5 * where[i] * bins) + 1] += 1.0
-            elif where[i] >= 3.0:
-                falling[int(0.5 * (where[i] - 3.0) * bins) + 1] += 1.0
+            if where[i] == where[i]:
+                falls = 1 if where[i] >= 3.0 else 0
+                k = int(0.5 * (where[i] - 3.0 * falls) * bins) + 1
+                sums[falls, 0, k] += 1.0
+                sums[falls, 1, k] += depth[i]
+                sums[falls, 2, k] += depth[i] * depth[i]
         for i in range(1, bins + 1):
-            L = 0.5 * rising[i - 1] + rising[i] + 0.5 * rising[i + 1]
-            if L * m <= best * best:
+            L = _votes(sums[0], i, limits[3])
+            if L * m <= best * best or abs(_tangent(i, bins)) > limits[2]:
                 continue
             for j in range(i + 1, bins + 1):
-                F = 0.5 * falling[j - 1] + falling[j] + 0.5 * falling[j + 1]
-                score = math.sqrt(L * F)
-                if score > best:
+                if L * (sums[1, 0, j - 1] + sums[1, 0, j] + sums[1, 0, j + 1]) <= best * best:
+                    continue
+                score = math.sqrt(L * _votes(sums[1], j, limits[3]))
+                if score > best and abs(_tangent(j, bins)) <= limits[2]:
                     k_l, k_r = _tangent(i, bins), _tangent(j, bins)
-                    if k_min <= k_r - k_l <= k_max and not _like(headings[t], k_l, k_r, tried):
+                    if limits[0] <= k_r - k_l <= limits[1] and not _like(headings[t], k_l, k_r, tried):
                         best, heading, left, right = score, headings[t], k_l, k_r
     return best, heading, left, right
 
 
 @kernel
+def _votes(sums: Array, i: int, ratio: float) -> float:
+    """Points of bin i and half of those beside it; 0 if they do not reach from near to far."""
+    n = 0.5 * sums[0, i - 1] + sums[0, i] + 0.5 * sums[0, i + 1]
+    if n == 0.0:
+        return 0.0
+    mean = (0.5 * sums[1, i - 1] + sums[1, i] + 0.5 * sums[1, i + 1]) / n
+    square = (0.5 * sums[2, i - 1] + sums[2, i] + 0.5 * sums[2, i + 1]) / n
+    return n if square - mean * mean >= (ratio * mean) ** 2 else 0.0
+
+
+@kernel
 def _like(heading: float, k_l: float, k_r: float, tried: Array) -> bool:
+    left, right = math.atan(k_l), math.atan(k_r)
     for i in range(len(tried)):
-        near = 0.12 * (tried[i, 2] - tried[i, 1])
-        if abs(heading - tried[i, 0]) < 0.03 and abs(k_l - tried[i, 1]) < near and abs(k_r - tried[i, 2]) < near:
+        l, r = math.atan(tried[i, 1]), math.atan(tried[i, 2])
+        near = 0.12 * (r - l) + 0.02
+        if abs(heading - tried[i, 0]) < 0.15 and abs(left - l) < near and abs(right - r) < near:
             return True
     return False
 

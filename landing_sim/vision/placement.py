@@ -86,6 +86,7 @@ def _footprint(
         x, y = u + a * au + r * su, v + a * av + r * sv
         g = view.ground
         w = g[2, 0] * x + g[2, 1] * y + g[2, 2]
+        w = w if w != 0.0 else 1e-300
         s = (g[0, 0] * x + g[0, 1] * y + g[0, 2]) / w
         s0, s1 = min(s0, s), max(s1, s)
         depth = max(depth, ((g[1, 0] * x + g[1, 1] * y + g[1, 2]) / w - border) * (1.0 if side == LEFT else -1.0))
@@ -207,7 +208,7 @@ def _place_threshold(
     if q[2] < NEAR:
         return 0
     t_u, t_v = qd[0] * q[2] - q[0] * qd[2], qd[1] * q[2] - q[1] * qd[2]
-    norm = math.hypot(t_u, t_v)
+    norm = max(math.hypot(t_u, t_v), 1e-300)
     su, sv, au, av, advance = _path(row, t_u / norm, t_v / norm)
     if advance < 0.1:  # the runway's image runs along the threshold's: search normal to it instead
         su, sv, au, av, advance = _path(row, 0.0, 0.0)
@@ -238,7 +239,7 @@ def _place_threshold(
             if seen == n or turn >= fit:
                 continue
             t = (turn + 0.5) / fit
-            u, v = _on_line(row, ends[k, 0] + t * ends[k, 2], ends[k, 1] + t * ends[k, 3])
+            u, v = ends[k, 0] + t * ends[k, 2], ends[k, 1] + t * ends[k, 3]
             mu = (search + REACH) * abs(su) + half * abs(au) + 2.0
             mv = (search + REACH) * abs(sv) + half * abs(av) + 2.0
             if mu <= u <= view.frame[0] - 1.0 - mu and mv <= v <= view.frame[1] - 1.0 - mv:

@@ -78,7 +78,8 @@ def dot(l: Array, q: Array) -> float:
 @kernel
 def oriented(l: Array, q: Array) -> Array:
     """l scaled to a unit normal, positive on the side of the homogeneous point or direction q."""
-    return l * ((1.0 if dot(l, q) >= 0.0 else -1.0) / math.hypot(l[0], l[1]))
+    norm = max(math.hypot(l[0], l[1]), 1e-12 * abs(l[2]), 1e-300)  # no direction: seen from its own plane, end on
+    return l * ((1.0 if dot(l, q) >= 0.0 else -1.0) / norm)
 
 
 @kernel
