@@ -265,9 +265,10 @@ def test_criteria_bounds_are_inclusive_and_missing_figures_fail():
         judge.Limit("sink_rate_mps", high=0.4),
         judge.Limit("touchdown_airspeed_mps", low=43.0),
         judge.Limit("width_m", high=1.0),
+        judge.Limit("sink_rate_mps", high=0.5),
     )
     verdict = judge.judge(by_hand(), limits)
-    assert [c.passed for c in verdict.criteria] == [True, False, True, False]
+    assert [c.passed for c in verdict.criteria] == [True, False, True, False, True]
     assert not verdict.passed
     assert judge.judge(by_hand(), limits[:1]).passed
     with pytest.raises(KeyError):
@@ -334,6 +335,13 @@ def test_predicted_edges_over_the_runway_stay_in_the_image(x):
     assert np.isfinite(lines.ends).all()
     assert (lines.ends >= -0.5 - 1e-9).all()
     assert (lines.ends <= 511.5 + 1e-9).all()
+    for feature, outward in ((Feature.LEFT, -1.0), (Feature.RIGHT, 1.0)):
+        for (u0, v0), (u1, v1) in lines.ends[lines.feature == feature]:
+            assert v0 > v1, "the near end is lower"
+            assert outward * (u0 - u1) > 0.0, "and farther out"
+            # both ends on the ray from the vanishing point straight ahead: slope H / (14.5 m) from the lens' height
+            height = 4.0 - synthetic.LEVER[2]
+            assert (v0 - 255.5) * 14.5 == pytest.approx(outward * (u0 - 255.5) * height)
 
 
 def test_clipping_by_hand():
