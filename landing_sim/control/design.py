@@ -47,7 +47,14 @@ class LinearModel:
 
     @staticmethod
     def straight(
-        airspeed: float, flight_path: float, mass: float, alpha: float, elevator: float, thrust: float, A: Array, B: Array
+        airspeed: float,
+        flight_path: float,
+        mass: float,
+        alpha: float,
+        elevator: float,
+        thrust: float,
+        A: Array,
+        B: Array,
     ) -> LinearModel:
         """About steady straight flight with wings level."""
         state = np.zeros(len(STATES))
@@ -109,7 +116,9 @@ def design(settings: ControlSettings, models: Sequence[LinearModel]) -> Design:
     points = []
     for wanted, model in zip(settings.trim_points, models):
         if abs(model.airspeed - wanted.airspeed_mps) > 0.5:
-            raise DesignError(f"the model is for {model.airspeed:.1f} m/s, the trim point {wanted.airspeed_mps:.1f} m/s")
+            raise DesignError(
+                f"the model is for {model.airspeed:.1f} m/s, the trim point {wanted.airspeed_mps:.1f} m/s"
+            )
         if model.A.shape != (12, 12) or model.B.shape != (12, 4):
             raise DesignError(f"A must be 12 x 12 and B 12 x 4, not {model.A.shape} and {model.B.shape}")
         points.append(_point(settings, model))
@@ -187,7 +196,9 @@ def _feedforwards(model: LinearModel) -> tuple[Array, Array, Array]:
 
     def steady(rows: str, unknown: str, inputs: list[int], given: str) -> Array:
         r = [STATES.index(name) for name in rows.split()]
-        M = np.hstack([model.A[np.ix_(r, [STATES.index(name) for name in unknown.split()])], model.B[np.ix_(r, inputs)]])
+        M = np.hstack(
+            [model.A[np.ix_(r, [STATES.index(name) for name in unknown.split()])], model.B[np.ix_(r, inputs)]]
+        )
         return np.asarray(np.linalg.solve(M, -model.A[r, STATES.index(given)]), np.float64)
 
     sideslip = steady("v p r", "phi", [2, 3], "v")

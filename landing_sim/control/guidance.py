@@ -48,21 +48,37 @@ class Path:
     touchdown_x: float
     approach: float  # [m/s]
     touchdown: float
+    rise: float = 0.0  # tangent of the runway's slope, > 0 uphill
 
     @staticmethod
-    def from_settings(s: PathSettings) -> Path:
+    def from_settings(s: PathSettings, rise: float = 0.0) -> Path:
         slope = math.tan(math.radians(s.glide_deg))
         top = s.flare_height_m + s.sink_height_m
         length = top / slope
         flare_x = s.touchdown_x_m - length * math.log(top / s.sink_height_m)
-        return Path(slope, flare_x, top, length, s.sink_height_m, s.touchdown_x_m, s.approach_mps, s.touchdown_mps)
+        return Path(
+            slope, flare_x, top, length, s.sink_height_m, s.touchdown_x_m, s.approach_mps, s.touchdown_mps, rise
+        )
 
     def height(self, x: float) -> tuple[float, float, float]:
-        """Height of the wheels [m], dH/dx and d2H/dx2 [1/m] at x; below the surface past the touchdown point."""
+        """Height of the wheels over the threshold [m], dH/dx and d2H/dx2 [1/m] at x; past touchdown below the surface.
+
+        The flare is that of a level runway on top of the sloping one, whose slope fades in while the flare begins: over as
+        long a way beyond the threshold as before it.
+        """
         if x <= self.flare_x:
             return self.top - self.sink_height + (self.flare_x - x) * self.slope, -self.slope, 0.0
         falling = self.top * math.exp(-(x - self.flare_x) / self.length)
-        return falling - self.sink_height, -falling / self.length, falling / self.length**2
+        level = falling - self.sink_height, -falling / self.length, falling / self.length**2
+        a, into = -self.flare_x, x - self.flare_x
+        if into >= 2.0 * a:
+            return level[0] + self.rise * x, level[1] + self.rise, level[2]
+        ramp = self.rise / (4.0 * a)
+        return level[0] + ramp * into * into, level[1] + 2.0 * ramp * into, level[2] + 2.0 * ramp
+
+    def surface(self, x: float) -> float:
+        """Height [m] of the ground over the threshold."""
+        return self.rise * x
 
     def speed(self, x: float) -> tuple[float, float]:
         """Airspeed [m/s] and dV/dx [1/s]: V² falls linearly, so that the deceleration is constant in still air."""
@@ -101,9 +117,10 @@ class LandingGuidance:
 
     __slots__ = ("capture", "path", "settings")
 
-    def __init__(self, settings: GuidanceSettings) -> None:
+    def __init__(self, settings: GuidanceSettings, slope: float = 0.0) -> None:
+        """slope [rad] of the runway as believed, > 0 uphill."""
         self.settings = settings
-        self.path = Path.from_settings(settings.path)
+        self.path = Path.from_settings(settings.path, math.tan(slope))
         c = settings.capture
         radius = self.path.approach**2 / (GRAVITY * math.tan(math.radians(c.bank_deg)))
         self.capture = Capture(c.join_m, radius, math.radians(c.intercept_limit_deg))
@@ -118,7 +135,7 @@ class LandingGuidance:
             )
         b = believed(estimate)
         m = motion(b)
-        wheels = _lowest_wheel(b, self.settings.gear)
+        wheels = self._lowest_wheel(b, self.settings.gear)
         mode, waiting = self._phase(memory, estimate, b, m, wheels)
         dt = min(max(estimate.t - memory.t, 0.0), 1.0)
         share = dt / (dt + self.settings.decrab.wind_filter_s) if math.isfinite(memory.seen) else 1.0
@@ -147,13 +164,14 @@ class LandingGuidance:
         s, path = self.settings, self.path
         height, wheel_x = wheels
         H_path, slope, curvature = path.height(wheel_x)
+        over_path = height + path.surface(wheel_x) - H_path
         V, V_slope = path.speed(wheel_x)
         if memory.bounced:  # down again from where it is, as steeply as the flare is there
             falling = max(height, 0.0) + path.sink_height
-            H_path, slope, curvature = height, -falling / path.length, falling / path.length**2
+            over_path, slope, curvature = 0.0, path.rise - falling / path.length, falling / path.length**2
             V, V_slope = path.touchdown, 0.0
         limit = s.path.height_error_limit_m
-        error = min(max(H_path - height, -limit), limit)
+        error = min(max(-over_path, -limit), limit)
         crab = -memory.crosswind / max(m.airspeed, 0.5 * path.touchdown)
         d = s.decrab
         aligned = d.fraction * min(max((d.start_height_m - height) / (d.start_height_m - d.end_height_m), 0.0), 1.0)
@@ -176,7 +194,7 @@ class LandingGuidance:
             "crosswind": memory.crosswind,  # [m/s] what crab and sideslip are meant for
             "downdraught": memory.downdraught,  # [m/s] what pitch is to be corrected for
             "wheel_height": height,  # [m]
-            "on_path": float(abs(H_path - height) < limit),
+            "on_path": float(abs(over_path) < limit),
         }
         return Reference(memory.mode, V, b.H + error, slope * m.x_dot, y, psi, phi, 0.0, r, extra)
 
@@ -242,13 +260,13 @@ class LandingGuidance:
         height, wheel_x = wheels
         return (
             abs(b.y) > g.max_y_m
-            or abs(height - self.path.height(wheel_x)[0]) > g.max_height_error_m
+            or abs(height + self.path.surface(wheel_x) - self.path.height(wheel_x)[0]) > g.max_height_error_m
             or abs(m.airspeed - self.path.speed(wheel_x)[0]) > g.max_speed_error_mps
         )
 
-
-def _lowest_wheel(b: Believed, gear: GearSettings) -> tuple[float, float]:
-    """Height [m] of the lower main wheel over the threshold plane, and x [m] of the mains."""
-    cth, sth = math.cos(b.theta), math.sin(b.theta)
-    drop = cth * (gear.down_m * math.cos(b.phi) + gear.side_m * abs(math.sin(b.phi))) - gear.forward_m * sth
-    return b.H - drop, b.x + (gear.forward_m * cth + gear.down_m * sth) * math.cos(b.psi)
+    def _lowest_wheel(self, b: Believed, gear: GearSettings) -> tuple[float, float]:
+        """Height [m] of the lower main wheel over the surface, and x [m] of the mains."""
+        cth, sth = math.cos(b.theta), math.sin(b.theta)
+        drop = cth * (gear.down_m * math.cos(b.phi) + gear.side_m * abs(math.sin(b.phi))) - gear.forward_m * sth
+        x = b.x + (gear.forward_m * cth + gear.down_m * sth) * math.cos(b.psi)
+        return b.H - drop - self.path.surface(x), x

@@ -94,9 +94,9 @@ class LandingController:
         elevator = _limited(elevator, last, dt, *self._limits[0])
         aileron = _limited(aileron, memory.aileron, dt, *self._limits[1])
         rudder = _limited(rudder, memory.rudder, dt, *self._limits[2])
-        return ControlMemory(
-            estimate.t, reference.mode, int_V, int_H, elevator, aileron, rudder, ground
-        ), Command(elevator, aileron, rudder, throttle, flap, left, right, _clip(pan, most), _clip(tilt, most))
+        return ControlMemory(estimate.t, reference.mode, int_V, int_H, elevator, aileron, rudder, ground), Command(
+            elevator, aileron, rudder, throttle, flap, left, right, _clip(pan, most), _clip(tilt, most)
+        )
 
     def _fly(
         self, memory: ControlMemory, b: Believed, m: Motion, ref: Reference, dt: float
@@ -121,18 +121,27 @@ class LandingController:
         e_u = m.u_air - ref.airspeed * math.cos(alpha)
         # Gusts faster than the wind that attitude is corrected for must not be taken for angle of attack, nor below for
         # sideslip: with attitude uncorrected, feedback of w and v is feedback of path and course.
-        e_w = m.w_air + (b.wz - wz) * math.cos(b.theta) * math.cos(b.phi) - ref.airspeed * math.sin(alpha) - w_pull * q_ref
+        e_w = (
+            m.w_air
+            + (b.wz - wz) * math.cos(b.theta) * math.cos(b.phi)
+            - ref.airspeed * math.sin(alpha)
+            - w_pull * q_ref
+        )
         e_q = b.q - q_ref
         e_th = b.theta - (alpha + path + ref.theta_ff + w_pull * q_ref / V)
         e_H = b.H - ref.height
         e_V = m.airspeed - ref.airspeed
         int_V = _clip(memory.int_V + e_V * dt, self._integral[0])
         int_H = _clip(memory.int_H + e_H * dt, self._integral[1])
-        elevator = elevator0 + el_pull * q_ref - per_q * (
-            ke_u * e_u + ke_w * e_w + ke_q * e_q + ke_th * e_th + ke_H * e_H + ke_iV * int_V + ke_iH * int_H
+        elevator = (
+            elevator0
+            + el_pull * q_ref
+            - per_q * (ke_u * e_u + ke_w * e_w + ke_q * e_q + ke_th * e_th + ke_H * e_H + ke_iV * int_V + ke_iH * int_H)
         )
-        thrust = thrust0 + mass * (GRAVITY * (path - path0) + extra("acceleration", 0.0)) - (
-            kt_u * e_u + kt_w * e_w + kt_q * e_q + kt_th * e_th + kt_H * e_H + kt_iV * int_V + kt_iH * int_H
+        thrust = (
+            thrust0
+            + mass * (GRAVITY * (path - path0) + extra("acceleration", 0.0))
+            - (kt_u * e_u + kt_w * e_w + kt_q * e_q + kt_th * e_th + kt_H * e_H + kt_iV * int_V + kt_iH * int_H)
         )
         throttle = self._thrust.throttle(thrust, V)
         # An integral must not run on where its actuator is at its end or its error is not the true one.
@@ -147,11 +156,15 @@ class LandingController:
         e_ph = b.phi - ref.phi - ph_slip * slip
         e_ps = math.remainder(b.psi - ref.psi, 2.0 * math.pi)
         e_y = b.y - ref.y
-        aileron = a_slip * slip + a_turn * ref.r_ff - per_q * (
-            ka_v * e_v + ka_p * b.p + ka_r * e_r + ka_ph * e_ph + ka_ps * e_ps + ka_y * e_y
+        aileron = (
+            a_slip * slip
+            + a_turn * ref.r_ff
+            - per_q * (ka_v * e_v + ka_p * b.p + ka_r * e_r + ka_ph * e_ph + ka_ps * e_ps + ka_y * e_y)
         )
-        rudder = r_slip * slip + r_turn * ref.r_ff - per_q * (
-            kr_v * e_v + kr_p * b.p + kr_r * e_r + kr_ph * e_ph + kr_ps * e_ps + kr_y * e_y
+        rudder = (
+            r_slip * slip
+            + r_turn * ref.r_ff
+            - per_q * (kr_v * e_v + kr_p * b.p + kr_r * e_r + kr_ph * e_ph + kr_ps * e_ps + kr_y * e_y)
         )
         return elevator, throttle, aileron, rudder, int_V, int_H
 

@@ -10,7 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-_STRICT = {"extra": "forbid", "strict": True, "allow_inf_nan": False}  # for vehicle.py, which builds these with pydantic
+_STRICT = {
+    "extra": "forbid",
+    "strict": True,
+    "allow_inf_nan": False,
+}  # for vehicle.py, which builds these with pydantic
 
 
 def _increasing(name: str, values: Sequence[float]) -> None:

@@ -33,10 +33,11 @@ from landing_sim.sensors.render import Optics
 from landing_sim.sensors.squat import SquatSwitch
 from landing_sim.signals import Feature, Step, Touchdown
 from landing_sim.vehicle import Vehicle
-from landing_sim.vision.believed import BelievedCamera, RunwayMap, TaxiwayMouth
+from landing_sim.vision.believed import BelievedCamera, RunwayMap, TaxiwayMouth, ThresholdStripes
 from landing_sim.vision.front_end import FrontEndConfig, RunwayFrontEnd
 from landing_sim.vision.windows import EdgeConfig
 from landing_sim.world.dryden import W20, Turbulence
+from landing_sim.world.markings import stripe_count
 from landing_sim.world.runway import Greys, Runway, Taxiway
 from landing_sim.world.wind import CrosswindStep, ExponentialGust, SteadyWind, Wind, WindConfig
 
@@ -149,9 +150,9 @@ def build(scenario: Scenario, vehicle: Vehicle, seed: int, run: int = 0) -> Miss
             plant,
             wind,
             sensors,
-            _front_ends(scenario, camera, noise("acquisition")),
+            _front_ends(scenario, camera),
             _estimator(scenario, vehicle, camera, noise("believed")),
-            LandingGuidance(vehicle.guidance),
+            LandingGuidance(vehicle.guidance, math.atan(scenario.runway.slope_percent / 100.0)),
             LandingController(planned),
         ),
     )
@@ -278,20 +279,27 @@ def _believed_width(scenario: Scenario) -> float:
     return scenario.runway.width_m if believed is None else believed
 
 
-def _front_ends(scenario: Scenario, camera: BelievedCamera, noise: Noise) -> dict[str, FrontEnd]:
+def _front_ends(scenario: Scenario, camera: BelievedCamera) -> dict[str, FrontEnd]:
     runway, v, s = scenario.runway, scenario.vision, scenario.sensors
     seen = _runway(scenario)
+    # marks come in pairs either side of the centreline: the map keeps how far out they reach
+    blocks = [m for m in seen.markings if m.kind in ("aiming_point", "touchdown_zone")]
+    paint = sorted({(m.x0, m.x1, -max(-m.y0, m.y1), max(-m.y0, m.y1)) for m in blocks if m.y1 > 0.0})
     known = RunwayMap(
         width=_believed_width(scenario),
         length=runway.length_m,
         slope=seen.slope,
+        stripes=ThresholdStripes(stripe_count(runway.width_m) if runway.markings else 0),
+        paint=tuple(paint),
+        brighter=runway.grey.surface > runway.grey.grass,
         mouths=tuple(
             TaxiwayMouth(*t.mouth, Feature.LEFT if t.side == "left" else Feature.RIGHT)
             for t, wanted in zip(seen.taxiways, runway.taxiways)
             if wanted.mapped
         ),
     )
-    front_end = RunwayFrontEnd(known, camera, FrontEndConfig(v.windows, v.platform_angle, edges=EdgeConfig(floor=v.edge_floor_px)))
+    config = FrontEndConfig(v.windows, v.platform_angle, edges=EdgeConfig(floor=v.edge_floor_px))
+    front_end = RunwayFrontEnd(known, camera, config)
     return {
         "camera": front_end,
         "gyro": Reading("gyro", "gyro", math.radians(max(s.gyro.noise_dps, 0.01))),
@@ -314,7 +322,7 @@ def _estimator(scenario: Scenario, vehicle: Vehicle, camera: BelievedCamera, noi
     )
     ekf = RunwayEkf(
         config,
-        vehicle.believed.perturbed(noise, b.aero_sigma, b.mass_sigma),
+        replace(vehicle.believed, rho=_air_density(scenario)).perturbed(noise, b.aero_sigma, b.mass_sigma),
         camera.intrinsics,
         np.array(camera.p_BC),
         _believed_width(scenario),
@@ -324,6 +332,12 @@ def _estimator(scenario: Scenario, vehicle: Vehicle, camera: BelievedCamera, noi
     if latency > 0.0 and f.compensate_latency:
         return Rewind(ekf, latency + 2.0 * scenario.time.cycle_s)
     return ekf
+
+
+def _air_density(scenario: Scenario) -> float:
+    """[kg/m^3] of the standard atmosphere where the approach begins: what an altimeter tells the crew."""
+    height = scenario.runway.elevation_m + 0.5 * scenario.initial.height_m
+    return 1.225 * (1.0 - 0.0065 * height / 288.15) ** 4.2559
 
 
 def _control_settings(scenario: Scenario, vehicle: Vehicle) -> ControlSettings:

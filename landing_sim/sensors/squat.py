@@ -6,7 +6,7 @@ from landing_sim.signals import CameraTruth, Sample, Truth
 
 
 class SquatSwitch:
-    """1.0 while both main wheels carry weight, else 0.0 (interfaces.Sensor)."""
+    """1.0 while a main wheel carries weight, else 0.0 (interfaces.Sensor)."""
 
     name = "squat"
     channels = 1
@@ -15,4 +15,4 @@ class SquatSwitch:
         self.period = period
 
     def sense(self, truth: Truth, camera: CameraTruth) -> Sample:
-        return Sample(self.name, truth.t, truth.t, float(truth.on_ground[0] and truth.on_ground[1]))
+        return Sample(self.name, truth.t, truth.t, float(truth.on_ground[0] or truth.on_ground[1]))
