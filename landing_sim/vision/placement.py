@@ -110,7 +110,7 @@ def _place_border(
     n: int,
     side: int,
     view: View,
-    sigma: float,
+    sigma: Array,
     rule: Array,
     paint: Array,
     mouths: Array,
@@ -119,13 +119,13 @@ def _place_border(
 
     Kept clear of the corners and of where the borderlines and the horizon converge; those at a mapped taxiway mouth are
     dropped. Of the places around each regular one the first is taken where no paint is within the search range; else
-    within the smallest one; else within the mask itself, the test for ambiguity standing guard; else with a short mask.
+    within the smallest one; else within the mask itself, the test for ambiguity standing guard; else with shorter masks.
     """
     for i in range(at, at + n):
         I[i, FEATURE], I[i, STATUS] = side, _OUT
     l, length, half = view.lines[side], view.length, int(rule[MASK]) // 2
     su, sv, au, av, advance = _path(l, 0.0, 0.0)
-    wanted = _range(rule, sigma, advance)
+    wanted = _range(rule, sigma[side], advance)
     mu = (wanted + REACH) * abs(su) + half * abs(au) + 2.0
     mv = (wanted + REACH) * abs(sv) + half * abs(av) + 2.0
     q0, qd = view.threshold + (side - 0.5) * view.width * view.across, view.along
@@ -143,7 +143,12 @@ def _place_border(
     a_u, a_v = q_a[0] / q_a[2], q_a[1] / q_a[2]
     d_u, d_v = q_b[0] / q_b[2] - a_u, q_b[1] / q_b[2] - a_v
     # the mask, the runway's side of its profile included, stays clear of the threshold and of the far end
-    depth = half * abs(row[0] * au + row[1] * av) + _CLEAR + 3.5 * max(0.0, -(row[0] * su + row[1] * sv))
+    depth = (
+        half * abs(row[0] * au + row[1] * av)
+        + _CLEAR
+        + 2.0 * sigma[THRESHOLD]
+        + 3.5 * max(0.0, -(row[0] * su + row[1] * sv))
+    )
     inset = depth / max(1e-9, abs(row[0] * d_u + row[1] * d_v))
     t0, t1 = inset if lo <= 0.0 else 0.0, 1.0 - (inset if hi >= length else 0.0)
     span = (t1 - t0) * max(abs(d_u), abs(d_v))  # in pixels of the mask
@@ -152,7 +157,7 @@ def _place_border(
     m = min(n, int(span / rule[MASK]) + 1)
     for i in range(m):
         wish = 0.5 if m == 1 else i / (m - 1.0)
-        for k in range(4 * _PLACES):
+        for k in range(5 * _PLACES):
             level, place = k // _PLACES, k % _PLACES
             t = wish + (place // 2 + place % 2) * (1.0 if place % 2 else -1.0) / 32.0
             if t < 0.0 or t > 1.0:
@@ -165,7 +170,7 @@ def _place_border(
                     taken |= max(abs(F[j, CENTRE] - u), abs(F[j, CENTRE + 1] - v)) < rule[MASK]
             if taken:
                 continue
-            h = half if level < 3 else min(half, 2)
+            h = half if level < 3 else min(half, 5 - level)
             search = wanted if level == 0 else min(wanted, rule[SEARCH_MIN])
             reach = _PROFILE + (search + 1.0 if level < 2 else 0.0)
             s0, s1, deep = _footprint(view, side, u, v, su, sv, au, av, h, reach)
@@ -321,8 +326,8 @@ def place(
     n_T = counts[THRESHOLD]
     seen = _place_threshold(F, I, 0, n_T, view, sigma[THRESHOLD], rule, runway[2:])
     n_L, n_R = counts[LEFT] + (n_T - seen + 1) // 2, counts[RIGHT] + (n_T - seen) // 2
-    _place_border(F, I, n_T, n_L, LEFT, view, sigma[LEFT], rule, paint, mouths)
-    _place_border(F, I, n_T + n_L, n_R, RIGHT, view, sigma[RIGHT], rule, paint, mouths)
+    _place_border(F, I, n_T, n_L, LEFT, view, sigma, rule, paint, mouths)
+    _place_border(F, I, n_T + n_L, n_R, RIGHT, view, sigma, rule, paint, mouths)
     _place_horizon(F, I, n_T + n_L + n_R, counts[HORIZON], view, sigma[HORIZON], rule)
     n = n_T + n_L + n_R + counts[HORIZON]
     F, I = F[:n], I[:n]
