@@ -162,7 +162,7 @@ def _range_and_height(gust: FlightLog, flown: Mapping[Run, Flown]) -> Figure:
         distance.axvline(-120.0, color=OTHER, ls=":", lw=1)
         distance.set(title="range error; dotted: threshold lost (paper)", ylim=(-12, 12))
         for log, colour, text in (
-            (lagging, OTHER, "straight in, commanded angles, platform with lag"),
+            (lagging, OTHER, "straight in, angles as commanded, lag 0.06 s"),
             (prompt, TRUE, "the same, without lag"),
             (gust, ESTIMATED, "the paper's case, angles from encoders"),
         ):
@@ -173,12 +173,11 @@ def _range_and_height(gust: FlightLog, flown: Mapping[Run, Flown]) -> Figure:
             height.plot([0, 550], [0.5 * sign, 0.5 * sign], color=CLAIM, ls="--", lw=1)
         height.axvline(-250.0, color=OTHER, ls=":", lw=1)
         height.set(xlabel=DISTANCE, ylabel="height error [m]", title="height error; dotted: flare begins (paper)")
-        height.legend(loc="upper right")
+        height.legend(loc="lower left")
 
     caption = (
         "Text of section 7.1, drawn: range within 5 m until the threshold is lost, then only predicted (the band opens). "
-        "A platform lag that the filter does not know of shows little in height: that rests on the angle between the "
-        "borderlines, which tilt does not change."
+        "On the right a platform lag that the filter does not know of: at flare onset it shows in pitch, not in height."
     )
     return Figure("7.1", "Range and height errors", _svg(draw, 2), caption)
 
