@@ -347,7 +347,6 @@ def test_reproduce_writes_the_report(tmp_path):
     by_id = {row["id"]: row["verdict"] for row in found.result["claims"]}
     for id in (
         "range",
-        "threshold-lost",
         "height-approach",
         "height-runway",
         "touchdown",

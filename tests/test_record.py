@@ -451,3 +451,42 @@ def test_a_recording_that_cannot_be_shown_says_why(tmp_path, monkeypatch):
     monkeypatch.setattr("shutil.which", lambda name: None)
     with pytest.raises(replay.ReplayError, match="missing"):
         replay.open_viewer(tmp_path / "a.rrd")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is always a display to open")
+def test_a_live_view_without_a_display_says_why(tmp_path, monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(replay.ReplayError, match="no live view"):
+        replay.Recorder(tmp_path / "a.rrd", replay.Scene(CAMERA, 29.0, 1680.0), live=True)
+
+
+def test_a_live_view_streams_to_this_machine_and_records(tmp_path, monkeypatch):
+    """The viewer's place is taken by its own server, which needs no display."""
+    from landing_sim.record import viewer
+
+    beside = Path(sys.executable).with_name("rerun")
+    stand_in = tmp_path / "rerun"
+    stand_in.write_text(f'#!/bin/sh\nexec "{beside}" --serve-grpc "$@"\n')
+    stand_in.chmod(0o755)
+    started = []
+    original = subprocess.Popen
+
+    def popen(command, **options):
+        started.append(original(command, **options))
+        assert command[command.index("--bind") + 1] == "127.0.0.1"
+        return started[-1]
+
+    monkeypatch.setattr(viewer, "_program", lambda: str(stand_in))
+    monkeypatch.setattr(subprocess, "Popen", popen)
+    try:
+        recorder = replay.Recorder(tmp_path / "a.rrd", replay.Scene(CAMERA, 29.0, 1680.0), frames_hz=2.0, live=True)
+        steps = list(synthetic.fly(duration=1.2))
+        for step in steps:
+            recorder.add(step)
+        recorder.close(build(steps, touchdown=None))
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+    assert {"/world/camera/image", "/errors/x", "/world/aircraft"} <= chunks(tmp_path / "a.rrd").keys()

@@ -81,8 +81,8 @@ acquired until touchdown.</p>
 {% endfor %}
 
 <h2>Flights</h2>
-<p class="lead">Each flight can be flown again, to the same bits:
-<code>landing-sim run SCENARIO --set … --seed N</code>.</p>
+<p class="lead">Each can be flown again, to the same bits, with
+<code>landing-sim run SCENARIO --set … --seed N</code>; the scripted pilot's are flown by this report only.</p>
 <div class="card scroll">
 <table>
 <tr><th>scenario</th><th>changes</th><th>seeds</th></tr>

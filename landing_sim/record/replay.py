@@ -7,9 +7,6 @@ Positions are in R, local to the threshold: the viewer's float32 would lose them
 
 from __future__ import annotations
 
-import shutil
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,19 +17,18 @@ from landing_sim.geometry.so3 import camera_from_body, from_euler
 from landing_sim.record import overlay, shapes
 from landing_sim.record.channels import ERRORS, MODE_COLOURS, SERIES, SPANS, events
 from landing_sim.record.log import FlightLog
+from landing_sim.record.viewer import ReplayError, open_viewer, start_live_viewer
 from landing_sim.signals import Feature, Status, Step
 
 if TYPE_CHECKING:
     import rerun as rr
 
+__all__ = ["Recorder", "ReplayError", "Scene", "events", "open_viewer", "record_log"]
+
 TIMELINE = "time"
 SIGHT = 30.0  # [m]
 TRUE_COLOUR, ESTIMATE_COLOUR, BAND_COLOUR = (60, 220, 120), (255, 170, 40), (150, 150, 165)
 IMAGE = "world/camera/image"
-
-
-class ReplayError(RuntimeError):
-    """The recording cannot be written or shown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +55,7 @@ class Recorder:
     frames_hz : camera images a second; 0 = none. An image is rendered only if it is recorded.
     live : also show the flight in a viewer while it lasts
 
-    Raises ReplayError if the file cannot be written.
+    Raises ReplayError if the file cannot be written, or if there is no viewer for a live view.
     """
 
     def __init__(self, path: Path, scene: Scene, frames_hz: float = 8.0, live: bool = False) -> None:
@@ -72,10 +68,12 @@ class Recorder:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
             if live:
-                self._stream.spawn(connect=False)
-                self._stream.set_sinks(rr.GrpcSink(), rr.FileSink(str(path)), default_blueprint=_blueprint(scene))
+                sinks = rr.GrpcSink(start_live_viewer()), rr.FileSink(str(path))
+                self._stream.set_sinks(*sinks, default_blueprint=_blueprint(scene))
             else:
                 self._stream.save(path, default_blueprint=_blueprint(scene))
+        except ReplayError:
+            raise
         except Exception as error:
             raise ReplayError(f"cannot record to {path}: {error}") from error
         self._stream.send_recording_name(scene.title)
@@ -221,27 +219,6 @@ def record_log(stream: rr.RecordingStream, log: FlightLog) -> None:
     for when, text in events(log):
         stream.set_time(TIMELINE, duration=when)
         stream.log("flight/events", rr.TextLog(text, level=rr.TextLogLevel.INFO))
-
-
-def open_viewer(path: Path, web: bool = False) -> None:
-    """Show a recording until the viewer is closed; nothing but this machine can reach it.
-
-    web : serve it to a browser instead of opening a window. Raises ReplayError if it cannot be shown.
-    """
-    beside = Path(sys.executable).with_name("rerun")
-    program = str(beside) if beside.exists() else shutil.which("rerun")
-    if program is None:
-        raise ReplayError("the rerun viewer is missing: install it with `pip install 'rerun-sdk>=0.41,<0.42'`")
-    if not path.is_file():
-        raise ReplayError(f"{path}: no such recording")
-    command = [program, "--bind", "127.0.0.1", *(["--web-viewer"] if web else []), str(path)]
-    try:
-        code = subprocess.run(command, check=False).returncode
-    except KeyboardInterrupt:
-        return
-    if code != 0:
-        hint = "" if web else "; without a display, `--web` shows it in a browser"
-        raise ReplayError(f"the viewer ended with code {code}{hint}")
 
 
 def _blueprint(scene: Scene) -> Any:
