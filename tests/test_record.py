@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -487,6 +489,6 @@ def test_a_live_view_streams_to_this_machine_and_records(tmp_path, monkeypatch):
         recorder.close(build(steps, touchdown=None))
     finally:
         for process in started:
-            process.kill()
+            os.killpg(process.pid, signal.SIGKILL)
             process.wait()
     assert {"/world/camera/image", "/errors/x", "/world/aircraft"} <= chunks(tmp_path / "a.rrd").keys()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -58,7 +60,7 @@ def start_live_viewer() -> str:
             if listening == 5:
                 return f"rerun+http://127.0.0.1:{port}/proxy"
             time.sleep(0.2)
-    viewer.terminate()
+    os.killpg(viewer.pid, signal.SIGTERM)  # the program starts a child
     raise ReplayError(f"no live view: the viewer did not answer within {PATIENCE:g} s")
 
 
