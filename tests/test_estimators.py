@@ -124,6 +124,19 @@ def test_edge_jacobian_against_differences(seed: int, slope: float) -> None:
     np.testing.assert_allclose(Hx[8:], num[8:], rtol=2e-3, atol=2.0)
 
 
+def test_the_horizon_says_nothing_of_a_height_below_the_ground_it_belongs_to() -> None:
+    """A downhill runway leads below the level it starts from, where the horizon no longer dips."""
+    x = random_state(np.random.default_rng(2))
+    Hx = np.empty((1, states.N))
+    for height, observable in ((20.0, True), (-5.0, False)):
+        x[states.H] = height
+        edge_model(
+            x, np.array([3]), np.array([[100.0, 250.0]]), np.array([[0.0, 1.0]]), 0.0, 0.0, bench.LEVER, bench.focal(),
+            -0.02, np.empty(1), Hx,
+        )  # fmt: skip
+        assert (abs(Hx[0, states.H]) > 1e-3) == observable
+
+
 def test_edge_model_agrees_with_the_image_lines() -> None:
     """Points on the closed-form image line have zero displacement: two derivations of the same edge."""
     rng = np.random.default_rng(0)

@@ -97,6 +97,8 @@ def collect(optics: Optics, runway: Runway, feature: int, n: int = 40) -> Array:
 @pytest.mark.parametrize("feature", FEATURES)
 @pytest.mark.parametrize("runway", [BARE, Runway(painted=False, slope=0.01, width=45.0)], ids=["level", "sloping"])
 def test_edges_lie_where_geometry_puts_them(feature: int, runway: Runway) -> None:
+    if feature == runway_image.HORIZON and runway.slope > 0.0:
+        pytest.skip("a runway that rises hides the horizon")
     errors = collect(CLEAN, runway, feature)
     assert len(errors) > 100
     assert abs(errors.mean()) < 0.01

@@ -17,7 +17,7 @@ import math
 import numpy as np
 
 from landing_sim.estimators.states import EPAN, ETILT, JPAN, JTILT, PHI, PSI, THETA, WIDTH, H, X, Y
-from landing_sim.geometry.runway_image import EARTH_RADIUS, HORIZON, LEFT, RIGHT, THRESHOLD, plane_normal
+from landing_sim.geometry.runway_image import EARTH_RADIUS, HORIZON, LEFT, RIGHT, THRESHOLD, horizon_dip, plane_normal
 from landing_sim.geometry.so3 import camera_from_body, from_euler
 from landing_sim.jit import kernel
 from landing_sim.types import Array
@@ -90,9 +90,9 @@ def edge_model(
         # gradient of (dm . rho) with respect to the camera's position: n = (P - C) x d
         g[:] = 0.0
         if kind == HORIZON:
-            height = max(-p_RC[2], 0.01)
-            dip = math.acos(EARTH_RADIUS / (EARTH_RADIUS + height))
-            d_dip = EARTH_RADIUS / (EARTH_RADIUS + height) ** 2 / math.sin(dip)
+            height = -p_RC[2]
+            dip = horizon_dip(height)
+            d_dip = EARTH_RADIUS / (EARTH_RADIUS + height) ** 2 / math.sin(dip) if height > 0.01 else 0.0
             cd, sd = math.cos(dip), math.sin(dip)
             g[2] = -d_dip * (-cd * (math.cos(azimuth) * rho_R[0] + math.sin(azimuth) * rho_R[1]) - sd * rho_R[2])
         else:

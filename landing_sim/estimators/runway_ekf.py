@@ -60,6 +60,8 @@ class FilterConfig:
     watchdog_share: float = 0.35  # smoothed share of rejected edges that means "locked out"
     watchdog_memory: float = 5.0  # frames
     lost_after: int = 30  # frames without edges
+    pose_gate: float = 5.0  # a pose further off than this many sigma is not believed ...
+    blind_after: int = 150  # ... before this many frames without edges
     approach_angle: float = -3.0 * RAD  # believed flight path while nothing is known
 
 
@@ -244,9 +246,19 @@ class RunwayEkf:
         return np.square(sd)
 
     def _start(self, memory: Memory, m: Measurement) -> Memory:
-        """From an acquired pose: velocity from the airspeed and the approach angle, rates from the gyros."""
+        """From an acquired pose: velocity from the airspeed and the approach angle, rates from the gyros.
+
+        A filter that flies blind takes a pose only if it is where it may be, until it has been blind for too long.
+        """
         c, idx = self.config, self.blocks.index
         x = memory.x.copy()
+        pose = [states.X, states.Y, states.H, states.PHI, states.THETA, states.PSI]
+        if memory.valid and memory.misses < c.blind_after:
+            rows = [int(np.flatnonzero(idx == state)[0]) for state in pose]
+            off = m.z - x[pose]
+            S = self._covariance(memory)[np.ix_(rows, rows)] + m.R
+            if off @ np.linalg.solve(S, off) > c.pose_gate**2 * len(pose):
+                return replace(memory, misses=memory.misses + 1)
         var = self._prior.copy()
         if not memory.valid:
             x[:] = 0.0
@@ -255,9 +267,8 @@ class RunwayEkf:
             alpha = min(max(theta - c.approach_angle, -0.1), 0.2)
             x[states.U], x[states.W] = memory.airspeed * math.cos(alpha), memory.airspeed * math.sin(alpha)
             x[states.P : states.R + 1] = memory.gyro
-        x[[states.X, states.Y, states.H, states.PHI, states.THETA, states.PSI]] = m.z
+        x[pose] = m.z
         P = np.diag(var)
-        pose = [states.X, states.Y, states.H, states.PHI, states.THETA, states.PSI]
         P[np.ix_(pose, pose)] = m.R
         # the encoder's errors are in the acquired attitude as well
         if states.EPAN in idx:

@@ -24,6 +24,7 @@ from landing_sim.noise import Noise
 from landing_sim.plants.aircraft import InitialState, JsbsimPlant
 from landing_sim.plants.jsbsim import PlantError
 from landing_sim.plants.trim import linearise, trim
+from landing_sim.record.judge import CRASH_SINK
 from landing_sim.scenario import Scenario
 from landing_sim.sensors.airdata import Airspeed, AirspeedConfig
 from landing_sim.sensors.camera import Camera, Encoders
@@ -43,7 +44,6 @@ from landing_sim.world.wind import CrosswindStep, ExponentialGust, SteadyWind, W
 
 STOPPED = 0.5  # [m/s] over the ground
 GO_AROUND_ENDS = 300.0  # [m] beyond the threshold
-CRASH_SINK = 5.0  # [m/s]
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """What became of a flight: outcome, touchdown, errors of the estimate, criteria. Pure functions of a `FlightLog`.
 
 Errors are JSBSim's truth against the estimate, of the cg, from 1.5 s after the runway was acquired until touchdown;
-x, y and sink at touchdown are the first main wheel's.
+x and sink at touchdown are the first main wheel's, y is that of the middle between the main wheels.
 """
 
 from __future__ import annotations

@@ -27,6 +27,7 @@ _SHEAR = 3.0  # a threshold window's path follows the runway's image up to this 
 _CLEAR = 2.0  # [px] between a mask and another edge
 _BESIDE = 1.5  # [px] between the end of a threshold mask and paint beside it: there, room is short
 _PROFILE = 4.5  # steps from the edge that the mask's profile reaches
+_BEYOND = 60.0  # [m] how far past the runway's end its graded strip goes on: ICAO Annex 14, 3.4
 _PLACES = 17  # places tried around each regular one, 1/32 of the line apart
 
 
@@ -72,6 +73,12 @@ def _put(
     F[at, STEP], F[at, STEP + 1], F[at, ALONG], F[at, ALONG + 1] = su, sv, au, av
     F[at, NORMAL_STEP] = advance
     I[at, STATUS], I[at, HALF], I[at, SEARCH] = _OK, half, int(search)
+
+
+@kernel
+def _hidden(view: View) -> bool:
+    """Whether the horizon is: by a runway that rises, from who is lower than its far end."""
+    return view.slope > 0.0 and -view.p_RC[2] < (view.length + _BEYOND) * math.tan(view.slope)
 
 
 @kernel
@@ -136,7 +143,8 @@ def _place_border(
         I[i, STATUS] = _SHORT
     other, sky, row, apart = view.lines[1 - side], view.lines[HORIZON], view.lines[THRESHOLD], rule[SEPARATION]
     lo, hi = cut(dot(other, q0) - apart * q0[2], dot(other, qd) - apart * qd[2], lo, hi)
-    lo, hi = cut(-dot(sky, q0) - apart * q0[2], -dot(sky, qd) - apart * qd[2], lo, hi)
+    if not _hidden(view):
+        lo, hi = cut(-dot(sky, q0) - apart * q0[2], -dot(sky, qd) - apart * qd[2], lo, hi)
     if lo >= hi:
         return
     q_a, q_b = q0 + lo * qd, q0 + hi * qd
@@ -245,8 +253,8 @@ def _place_threshold(
                 continue
             t = (turn + 0.5) / fit
             u, v = ends[k, 0] + t * ends[k, 2], ends[k, 1] + t * ends[k, 3]
-            mu = (search + REACH) * abs(su) + half * abs(au) + 2.0
-            mv = (search + REACH) * abs(sv) + half * abs(av) + 2.0
+            mu = (search + REACH + 0.5) * abs(su) + half * abs(au) + 1.5
+            mv = (search + REACH + 0.5) * abs(sv) + half * abs(av) + 1.5
             if mu <= u <= view.frame[0] - 1.0 - mu and mv <= v <= view.frame[1] - 1.0 - mv:
                 _put(F, I, at + seen, u, v, su, sv, au, av, advance, half, search)
                 seen += 1
@@ -271,6 +279,8 @@ def _place_horizon(F: Array, I: np.ndarray, at: int, n: int, view: View, sigma: 
     h0 = np.array([0.0, -sky[2] / sky[1], 1.0]) if upright else np.array([-sky[2] / sky[0], 0.0, 1.0])
     hd = np.array([1.0, -sky[0] / sky[1], 0.0]) if upright else np.array([-sky[1] / sky[0], 1.0, 0.0])
     lo, hi = in_image(h0, hd, -1e9, 1e9, mu, mv, view.frame)
+    if _hidden(view):
+        hi = lo
     below = rule[SEPARATION] + (search + REACH) * advance
     for i in range(at, at + n):
         I[i, FEATURE], I[i, STATUS] = HORIZON, _OUT
@@ -347,6 +357,6 @@ def place(
             F[i, OFFSET] = shift * math.hypot(F[i, STEP], F[i, STEP + 1])
             for k in range(2):
                 F[i, ORIGIN + k] = F[i, CENTRE + k] + shift * F[i, STEP + k]
-                low = math.floor(F[i, CENTRE + k]) - size[k] // 2 + 1
+                low = math.floor(F[i, ORIGIN + k]) - size[k] // 2 + 1
                 I[i, CORNER + k] = min(int(frame[k]) - size[k], max(0, low))
     return F, I, size[0], size[1]

@@ -12,6 +12,7 @@ from landing_sim.world.markings import Marking, runway_markings
 
 SKY, GRASS, SURFACE, PAINT = 0, 1, 2, 3  # what a point of the scene is made of: index into Greys.palette
 
+STRIP_SIDE, STRIP_END = 150.0, 60.0  # [m] graded ground beside and beyond the runway: ICAO Annex 14, 3.4 (runway strip)
 TAXIWAY_OVERLAP = 3.0  # [m] a taxiway's mouth is drawn this far into the runway, so that no seam shows
 
 
@@ -103,7 +104,9 @@ class Runway:
         Returns
         -------
         points : (m, 4, 3) [m], frame R, convex quadrilaterals; opposite edges are 0-2 and 1-3
-        material : (m,) int64, SURFACE or PAINT
+        material : (m,) int64, GRASS, SURFACE or PAINT
+
+        The ground around is level; where the runway slopes, the graded strip around it slopes with it.
         """
         flat = [quad for taxiway in self.taxiways for quad in self._taxiway(taxiway)]
         flat.append(_rectangle(0.0, self.length, -0.5 * self.width, 0.5 * self.width))
@@ -111,6 +114,10 @@ class Runway:
         flat += [_rectangle(m.x0, m.x1, m.y0, m.y1) for m in self.markings]
         material = np.full(len(flat), PAINT, dtype=np.int64)
         material[:paved] = SURFACE
+        if self.slope != 0.0:
+            side = 0.5 * self.width + STRIP_SIDE
+            flat.insert(0, _rectangle(-STRIP_END, self.length + STRIP_END, -side, side))
+            material = np.insert(material, 0, GRASS)
         return self.to_R(np.array(flat)), material
 
     def _taxiway(self, taxiway: Taxiway) -> list[Array]:
