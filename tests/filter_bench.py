@@ -8,7 +8,8 @@ from landing_sim.estimators import states
 from landing_sim.estimators.aircraft_model import downwash, propagate, thrust
 from landing_sim.estimators.belief import AircraftBelief
 from landing_sim.estimators.edge_model import edge_model
-from landing_sim.estimators.runway_ekf import FilterConfig, RunwayEkf
+from landing_sim.estimators.runway_ekf import RunwayEkf
+from landing_sim.estimators.runway_filter import FilterConfig
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.geometry.runway_image import image_line, plane_normal
 from landing_sim.geometry.so3 import camera_from_body, from_euler

@@ -15,7 +15,7 @@ from landing_sim.estimators.belief import AircraftBelief
 from landing_sim.estimators.edge_model import edge_model
 from landing_sim.estimators.inertial_model import airspeed_model, gyro_model
 from landing_sim.estimators.rewind import Rewind
-from landing_sim.estimators.runway_ekf import Blocks, FilterConfig
+from landing_sim.estimators.runway_filter import Blocks, FilterConfig
 from landing_sim.geometry.runway_image import image_line, plane_normal
 from landing_sim.geometry.so3 import camera_from_body, from_euler
 from landing_sim.signals import Status

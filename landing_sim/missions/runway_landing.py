@@ -16,7 +16,8 @@ from landing_sim.control.landing_lq import LandingController
 from landing_sim.control.settings import ControlSettings
 from landing_sim.estimators.readings import Reading
 from landing_sim.estimators.rewind import Rewind
-from landing_sim.estimators.runway_ekf import FilterConfig, RunwayEkf
+from landing_sim.estimators.runway_ekf import RunwayEkf
+from landing_sim.estimators.runway_filter import FilterConfig
 from landing_sim.geometry.earth import RunwayFrame
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.interfaces import Estimator, FrontEnd, Sensor
