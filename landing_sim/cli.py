@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 import traceback
 from pathlib import Path
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_threads, "1")
 
-PASSED, FAILED, USAGE, INTERNAL = 0, 1, 2, 3  # 130: interrupted
+PASSED, FAILED, USAGE, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 130
 
 app = typer.Typer(
     name="landing-sim",
@@ -50,6 +51,8 @@ def run(
     no_record: Annotated[bool, typer.Option("--no-record", help="Leave out the recording for the viewer.")] = False,
 ) -> None:
     """Fly a scenario: touchdown and accuracy table, columnar log, recording."""
+    if live and no_record:
+        raise typer.BadParameter("--live shows what is recorded: leave out --no-record")
     changes = [*(set_ or []), *([] if seed is None else [f"seed={seed}"])]
     _fly(_load(scenario, changes), scenario, out, as_json=json_, live=live, record=not no_record)
 
@@ -207,14 +210,19 @@ def _fly(
 
 def main() -> None:
     """Entry point: every way to end has its exit code and a message that helps."""
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # so that half a run is cleared away
     try:
         app(prog_name="landing-sim")
     except ConfigError as error:
         print(error, file=sys.stderr)
         sys.exit(USAGE)
     except KeyboardInterrupt:
-        print("interrupted; nothing was written", file=sys.stderr)
-        sys.exit(130)
+        print("interrupted", file=sys.stderr)
+        sys.exit(INTERRUPTED)
+    except SystemExit as end:  # what typer makes of Ctrl-C
+        if end.code == INTERRUPTED:
+            print("interrupted", file=sys.stderr)
+        raise
     except Exception as error:
         traceback.print_exc()
         print(f"\nlanding-sim: internal error: {error}\n`landing-sim doctor` may tell why.", file=sys.stderr)

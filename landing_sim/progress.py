@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -41,12 +42,13 @@ def shown(scenario: Scenario) -> Iterator[Callable[[Step], None]]:
         yield _lines()
         return
     from rich.console import Console
+    from rich.markup import escape
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[state]}"), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         start = scenario.initial.x_m
-        task = bar.add_task(scenario.name, total=scenario.runway.length_m - start, state="compiling, loading")
+        task = bar.add_task(escape(scenario.name), total=scenario.runway.length_m - start, state="compiling, loading")
 
         def watch(step: Step) -> None:
             x, height, airspeed = step.truth.p_RB[0], -step.truth.p_RB[2], step.truth.airspeed
@@ -73,10 +75,12 @@ def _lines() -> Callable[[Step], None]:
 def table(result: dict[str, Any]) -> None:
     """The result of a run: touchdown, every criterion beside its limit and source, files."""
     from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
     from rich.table import Table
 
     console = _console()
-    rows = Table(title=f"{result['scenario']}, seed {result['seed']}", title_justify="left", box=SIMPLE_HEAD)
+    title = escape(f"{result['scenario']}, seed {result['seed']}")
+    rows = Table(title=title, title_justify="left", box=SIMPLE_HEAD)
     for heading, justify in (("", "left"), ("ours", "right"), ("limit", "right"), ("", "left"), ("source", "left")):
         rows.add_column(heading, justify=justify)  # type: ignore[arg-type]
     for criterion in result["criteria"]:
@@ -88,7 +92,7 @@ def table(result: dict[str, Any]) -> None:
             "none" if value is None else f"{value:.2f} {unit}",
             f"{bounds} {unit}",
             "[green]met[/]" if criterion["passed"] else "[bold red]not met[/]",
-            criterion["source"],
+            escape(criterion["source"]),
         )
     console.print(rows)
     touchdown = result["touchdown"]
@@ -108,10 +112,12 @@ def table(result: dict[str, Any]) -> None:
         highlight=False,
     )
     for kind, file in result["files"].items():
-        console.print(f"  {kind:10} {file}", highlight=False, soft_wrap=True)
+        console.print(f"  {kind:10} {file}", highlight=False, markup=False, soft_wrap=True)
     if "recording" in result["files"]:
         console.print(
-            "  watch it:  landing-sim replay " + result["files"]["recording"].rsplit("/", 1)[0], soft_wrap=True
+            f"  watch it:  landing-sim replay {shlex.quote(result['files']['recording'].rsplit('/', 1)[0])}",
+            markup=False,
+            soft_wrap=True,
         )
 
 
@@ -131,7 +137,7 @@ def claims(result: dict[str, Any], report: Path) -> None:
     console.print(rows)
     counts = {verdict: sum(c["verdict"] == verdict for c in result["claims"]) for verdict in styles}
     console.print(", ".join(f"{n} {verdict.replace('_', ' ')}" for verdict, n in counts.items()), highlight=False)
-    console.print(f"  report     {report}", highlight=False, soft_wrap=True)
+    console.print(f"  report     {report}", highlight=False, markup=False, soft_wrap=True)
 
 
 def _console() -> Any:

@@ -124,9 +124,13 @@ def check_out(folder: Path, ours: Container[str] = _OURS) -> None:
     def refuse(message: str) -> ScenarioError:
         return ScenarioError([Problem(Mark(f"--out {folder}"), (), message)])
 
-    if folder.exists() and not folder.is_dir():
-        raise refuse("is a file, not a folder")
-    if folder.is_dir() and not _is_ours(folder, ours):
+    try:
+        if os.path.lexists(folder) and not folder.is_dir():
+            raise refuse("is a file, not a folder" if folder.exists() else "is a link to nowhere")
+        others = folder.is_dir() and not _is_ours(folder, ours)
+    except OSError as error:
+        raise refuse(f"cannot be used: {error.strerror}") from None
+    if others:
         raise refuse("is not empty and holds no earlier run: name another folder, or empty it")
 
 

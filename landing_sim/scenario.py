@@ -280,7 +280,9 @@ class Scenario(Section):
 
     schema_version: Literal[1] = Field(description="version of this format")
     mission: Literal["runway_landing"] = Field(description="what is flown")
-    name: str = Field("", max_length=100, description="short name; the file's own if left out")
+    name: str = Field(
+        "", max_length=100, pattern=r"^[^/\\\x00-\x1f\x7f]*$", description="short name; the file's own if left out"
+    )
     description: str = Field("", max_length=2000, description="what it is for")
     seed: int = Field(1, ge=0, lt=2**63, description="root of all random numbers")
     time: Time = Field(Time(), description="clock")

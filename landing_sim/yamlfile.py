@@ -206,6 +206,8 @@ class _Builder:
 
     def _scalar(self, event: Any, at: Location) -> Any:
         text = event.value
+        if not text.isprintable() and any("\ud800" <= letter <= "\udfff" for letter in text):
+            self._problem(event, at, "half of a surrogate pair is not a character")
         if event.style is not None or not event.implicit[0]:
             return text
         if text in _CONSTANTS:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -223,3 +224,43 @@ cli.main()
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert result.returncode == 3
     assert "landing-sim: internal error: division by zero" in result.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_ended_run_clears_up_after_itself_and_says_so(number: signal.Signals, tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [str(PROGRAM), "run", "do128/gust", "--out", "a/b/c"],
+        cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert process.stderr is not None
+    process.stderr.readline()  # the first phase: it flies
+    process.send_signal(number)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 128 + number
+    assert ("interrupted" in err) == (number == signal.SIGINT)
+    assert not list(tmp_path.iterdir())
+
+
+def test_live_without_a_recording_is_refused(tmp_path: Path) -> None:
+    result = cli("run", "do128/gust", "--live", "--no-record", cwd=tmp_path)
+    assert result.returncode == 2
+    assert "--no-record" in result.stderr
+
+
+@pytest.mark.parametrize(("name", "message"), [("gone", "is a link to nowhere"), ("x" * 300, "cannot be used: ")])
+def test_an_out_that_can_never_be_is_refused_before_flying(name: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "gone").symlink_to("nowhere")
+    result = cli("run", "do128/gust", "--out", name, cwd=tmp_path)
+    assert result.returncode == 2
+    assert message in result.stderr
+    assert '"phase"' not in result.stderr
+
+
+def test_words_in_brackets_are_shown_as_they_are(tmp_path: Path) -> None:
+    (tmp_path / "[b].yaml").write_text(
+        "schema_version: 1\nmission: runway_landing\ncriteria: [{metric: lateral_m, high: 1, source: '[/x] FAA [1]'}]\n"
+    )
+    result = cli("run", "[b].yaml", *SHORT, "--no-record", cwd=tmp_path)
+    assert result.returncode == 1, result.stderr
+    for words in ("[b].yaml, seed 1", "[/x] FAA [1]", "out/[b]-1/log.parquet"):
+        assert words in result.stdout

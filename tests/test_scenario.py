@@ -133,6 +133,8 @@ WRONG = {
     ),
     "taxiway without side": ("runway: {taxiways: [{x_m: 300}]}\n", r"s.yaml:3:21: runway.taxiways.0.side: missing"),
     "windows": ("vision: {windows: 3L3R2T}\n", r"s.yaml:3:19: vision.windows: "),
+    "name that leads elsewhere": ("name: ../../etc\n", r"s.yaml:3:7: name: "),
+    "half a letter": ('name: "\\ud800"\n', r"s.yaml:3:7: name: half of a surrogate pair"),
 }
 
 
