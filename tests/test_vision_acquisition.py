@@ -9,10 +9,13 @@ import pytest
 from vision_bench import APPROACH, CAMERA, RAD, Bench, fixate, pose_of, scattered_poses
 
 from landing_sim.geometry.so3 import from_euler
-from landing_sim.signals import Feature
-from landing_sim.vision.acquisition import Acquired, Acquisition, level_from_horizon
+from landing_sim.vision.acquisition import Acquired, Acquisition, AcquisitionConfig, level_from_horizon
 from landing_sim.vision.believed import RunwayMap
+from landing_sim.vision.hough import borders
 from landing_sim.world.runway import Runway, Taxiway
+
+LENS = np.array([CAMERA.f, CAMERA.cx, CAMERA.cy])
+NO_PAIR = np.empty((0, 3))
 
 # noise, contrast -> rms limits: range [%], height [%], y [m]. A trial implementation: 0.4-0.5 %, 0.3 %, 0.3 m.
 SETTINGS = {
@@ -82,11 +85,11 @@ def test_taxiways_do_not_confuse_it() -> None:
 def test_sloping_runway_is_acquired_with_its_slope_known_and_missed_by_height_without() -> None:
     pose = pose_of(APPROACH[3])
     pan, tilt = fixate(pose)
-    slope = 0.015
+    slope = 0.008
     bench = Bench(runway=Runway(slope=slope), known=RunwayMap(slope=slope))
     got = acquire(bench, pose, pan, tilt)
     assert got.z is not None
-    assert np.abs(got.z - pose)[:3] == pytest.approx(0.0, abs=3.0)
+    assert np.abs(got.z - pose)[:3] == pytest.approx(0.0, abs=2.0)
     wrong = acquire(Bench(runway=Runway(slope=slope)), pose, pan, tilt)
     assert wrong.z is None or abs(wrong.z[2] - pose[2]) > 3.0 * abs(got.z[2] - pose[2])
 
@@ -126,6 +129,23 @@ def test_failures_are_named() -> None:
     assert "threshold" in acquire(bench, over, *fixate(over)).reason
 
 
+def test_lines_across_the_runway_are_no_borders() -> None:
+    """The two edges of something level and straight across, 20 px below the horizon and as wide as the picture."""
+    u = np.arange(6.0, 506.0)
+    above = np.column_stack([u, np.full_like(u, 270.0), np.zeros_like(u), np.full_like(u, 8.0)])
+    below = np.column_stack([u, np.full_like(u, 276.0), np.zeros_like(u), np.full_like(u, -8.0)])
+    R_LC = level_from_horizon(250.0, 0.0, LENS, 0.0)
+    headings = np.arange(-0.49, 0.49, 0.001)
+    scores = [
+        borders(
+            np.vstack([above, below]), R_LC, LENS, 0.0, 1.0, headings, np.array([0.1, 20.0, 50.0, spread]), NO_PAIR
+        )[0]
+        for spread in (0.0, AcquisitionConfig().min_depth_spread)
+    ]
+    assert scores[0] > 50.0
+    assert scores[1] < AcquisitionConfig().min_points
+
+
 def test_same_picture_same_bits() -> None:
     pose = pose_of(APPROACH[1])
     pan, tilt = fixate(pose)
@@ -152,7 +172,6 @@ def test_level_frame_from_a_tilted_and_dipped_horizon() -> None:
         u.append(CAMERA.cx + CAMERA.f * ray[0] / ray[2])
         v.append(CAMERA.cy + CAMERA.f * ray[1] / ray[2])
     b = (v[1] - v[0]) / (u[1] - u[0])
-    R_LC = level_from_horizon(v[0] - b * u[0], b, np.array([CAMERA.f, CAMERA.cx, CAMERA.cy]), dip)
+    R_LC = level_from_horizon(v[0] - b * u[0], b, LENS, dip)
     assert R_LC[2] == pytest.approx(down_C, abs=1e-6)
     assert pytest.approx(np.eye(3), abs=1e-12) == R_LC @ R_LC.T
-    assert Feature.HORIZON == 3

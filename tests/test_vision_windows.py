@@ -297,6 +297,19 @@ def test_horizon_windows_keep_off_the_runway_on_the_ground() -> None:
     assert w.centre[w.feature == Feature.HORIZON, 1] == pytest.approx(CAMERA.cy + CAMERA.f * dip, abs=3.0)
 
 
+def test_a_horizon_window_wished_over_the_runway_moves_aside() -> None:
+    pose, bench = pose_of(APPROACH[-2]), Bench(noise=0.0)
+    pan, tilt = fixate(pose)
+    pan += 6.0 * RAD  # the vanishing point, and the runway below it, at the left edge of the image
+    planner = WindowPlanner(bench.known, bench.camera)
+    w = planner.place(sight(pose, pan, tilt), COV, COUNTS)
+    z, _, _, status = planner.measure(bench.sample(bench.renderer(), pose, pan, tilt).frame, w)
+    sky = w.feature == Feature.HORIZON
+    assert np.all(status[sky] == FOUND)
+    assert np.max(np.abs(z[sky])) < 0.03
+    assert w.centre[sky, 0].min() > 90.0
+
+
 # -------------------------------------------------------------------------------------------------- front end
 
 
