@@ -115,9 +115,13 @@ def design(
     from landing_sim import paths, vehicle
     from landing_sim.control import design as control
     from landing_sim.missions.runway_landing import linear_models
+    from landing_sim.plants.jsbsim import PlantError
 
     craft = vehicle.load(aircraft)
-    result = control.design(craft.control, linear_models(paths.aircraft_folder(aircraft), craft.control))
+    try:
+        result = control.design(craft.control, linear_models(paths.aircraft_folder(aircraft), craft.control))
+    except (PlantError, ValueError) as error:
+        raise ConfigError([Problem(Mark(aircraft), (), f"cannot be designed for: {error}")]) from error
     if json_:
         typer.echo(json.dumps({"aircraft": aircraft, **control.design_dict(result)}, allow_nan=False))
     else:

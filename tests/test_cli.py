@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from landing_sim import paths
+from landing_sim.errors import ConfigError
 
 PROGRAM = Path(sys.executable).with_name("landing-sim")
 SHORT = ("--set", "time.limit_s=1.2")  # a flight that ends before anything has happened
@@ -114,6 +115,20 @@ def test_design_prints_the_design(tmp_path: Path) -> None:
         assert word in result.stdout
     data = json.loads(cli("design", "do128", "--json", cwd=tmp_path).stdout)
     assert [round(p["airspeed_mps"]) for p in data["trim_points"]] == [50, 43]
+
+
+def test_an_aircraft_that_nothing_can_be_designed_for_is_a_bad_file(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    from landing_sim import cli
+
+    shutil.copytree(paths.aircraft_folder("do128"), tmp_path / "odd")
+    (tmp_path / "odd/do128.xml").rename(tmp_path / "odd/odd.xml")
+    file = tmp_path / "odd/vehicle.yaml"
+    file.write_text(file.read_text().replace("shape: {w: 1, u: 0}", "shape: {zz: 1}"))
+    monkeypatch.setattr(paths, "data_folder", lambda name: tmp_path)
+    with pytest.raises(ConfigError, match="odd:1:1: .*cannot be designed for: .*no state 'zz'"):
+        cli.design("odd")
 
 
 @pytest.fixture(scope="module")

@@ -281,6 +281,8 @@ def test_settings_name_what_is_wrong() -> None:
         replace(v.control.thrust, airspeed_mps=(0.0, 30.0, 20.0, 40.0, 50.0, 60.0, 80.0))
     with pytest.raises(ValueError, match="full_n must exceed idle_n"):
         replace(v.control.thrust, idle_n=v.control.thrust.full_n)
+    with pytest.raises(ValueError, match=r"flap must be 0 \.\.\. 1"):
+        replace(v.control, flap=5.0)
     assert isinstance(v.control.rollout, RolloutSettings)
 
 

@@ -200,6 +200,8 @@ class ControlSettings:
         _increasing("control.trim_points airspeed_mps", sorted(p.airspeed_mps for p in self.trim_points))
         if set(self.integral_limits) != {"int_V", "int_H"}:
             raise ValueError("integral_limits needs exactly int_V and int_H")
+        if not 0.0 <= self.flap <= 1.0:
+            raise ValueError(f"flap must be 0 ... 1, not {self.flap}")
 
 
 @dataclass(frozen=True, slots=True)
