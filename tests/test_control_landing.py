@@ -59,7 +59,7 @@ def test_do128_design_is_robust_and_near_what_was_asked_for() -> None:
                 assert loop.gain_up > 2.0
                 assert loop.gain_down < 0.5
                 assert loop.phase > math.radians(35.0)
-                assert loop.delay > 0.2  # beside the 90 ms already in the loop
+                assert loop.delay > 0.15  # beside the 90 ms already in the loop; traded for sink rate in turbulence
             for mode in axis.modes:
                 assert abs(mode.eigenvalue - mode.wanted) < 0.2 * abs(mode.wanted), mode.name
 
@@ -154,7 +154,7 @@ def test_a_gust_that_heading_is_not_corrected_for_is_not_taken_for_sideslip() ->
     assert abs(command(e, r).aileron) > 0.2  # told nothing, it must believe that it slips by 3 m/s
     trim = command(*in_trim()).elevator
     e, r = in_trim(wz=-2.0)
-    assert command(e, replace(r, extra={"downdraught": 0.0})).elevator == pytest.approx(trim, abs=1e-3)
+    assert command(e, replace(r, extra={"downdraught": 0.0})).elevator == pytest.approx(trim, abs=2e-3)
 
 
 def test_decrabbed_flight_is_a_steady_sideslip() -> None:

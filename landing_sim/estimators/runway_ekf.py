@@ -187,9 +187,9 @@ class RunwayEkf:
         P[np.ix_(pose, pose)] = m.R
         # the encoder's errors are in the acquired attitude as well
         if states.EPAN in idx:
-            for angle, errors in ((states.PSI, states.ENCODER[::2]), (states.THETA, states.ENCODER[1::2])):
-                for error in errors:
-                    P[angle, angle] += var[error]
+            for angle, bias, jitter in ((states.PSI, *states.ENCODER[::2]), (states.THETA, *states.ENCODER[1::2])):
+                P[angle, angle] += var[jitter]  # the bias is in m.R already
+                for error in (bias, jitter):
                     P[angle, error] = P[error, angle] = var[error]
         if c.width == "state":  # the acquired lengths hold for the width they were acquired with
             scale = np.zeros(states.N)

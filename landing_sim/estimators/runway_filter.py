@@ -35,7 +35,7 @@ class FilterConfig:
     q_rates: tuple[float, float, float] = (1.5 * RAD, 1.0 * RAD, 1.0 * RAD)  # [rad/s^2]
     q_attitude: float = 0.02 * RAD
     q_position: float = 0.02
-    q_wind: tuple[float, float, float] = (0.05, 0.6, 0.5)
+    q_wind: tuple[float, float, float] = (0.5, 0.6, 0.5)  # gusts must reach the airspeed that is flown
     q_width: float = 0.0
     q_ground_velocity: float = 2.0  # on the wheels
     q_ground_rates: float = 6.0 * RAD
