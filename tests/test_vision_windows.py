@@ -399,3 +399,13 @@ def test_no_believed_pose_however_odd_brings_it_down() -> None:
         placed = w.status == FOUND
         assert np.all(np.isfinite(w.centre[placed]))
         assert np.all((w.corner[placed] >= 0) & (w.corner[placed] + [w.width, w.height] <= 512))
+
+
+@pytest.mark.parametrize(
+    ("width", "stripes", "strips"), [(29.0, 6, 3), (23.0, 6, 1), (30.0, 8, 1), (45.0, 12, 1), (60.0, 16, 1)]
+)
+def test_threshold_windows_keep_off_side_strips_too_narrow_for_them(width: float, stripes: int, strips: int) -> None:
+    painted = ThresholdStripes(stripes)
+    clean = col.clean_strips(width, painted.outermost, painted.gap)
+    assert len(clean) == strips
+    assert clean[-1].tolist() == [-painted.gap, painted.gap]
