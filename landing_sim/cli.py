@@ -195,14 +195,18 @@ def _fly(
 ) -> None:
     """Fly, write, show. Ends the command with the exit code that the result deserves, unless told not to `leave`."""
     from landing_sim import progress, runner, vehicle
+    from landing_sim.record.viewer import ReplayError
 
     folder = out or Path("out") / f"{scenario.name}-{scenario.seed}"
     runner.check_out(folder)
     craft = vehicle.load(scenario.aircraft.model)
     with runner.out_folder(folder) as work:
         recording = work / runner.RECORDING if record else None
-        with progress.shown(scenario) as watch:
-            flight = runner.fly(scenario, craft, watch=watch, recording=recording, live=live)
+        try:
+            with progress.shown(scenario) as watch:
+                flight = runner.fly(scenario, craft, watch=watch, recording=recording, live=live)
+        except ReplayError as error:
+            raise ConfigError([Problem(Mark("--live" if live else f"--out {folder}"), (), str(error))]) from None
         result = runner.write(flight, scenario, label, work, folder)
     if as_json:
         typer.echo(json.dumps(result, allow_nan=False))

@@ -262,6 +262,21 @@ def test_live_without_a_recording_is_refused(tmp_path: Path) -> None:
     assert "--no-record" in result.stderr
 
 
+def test_live_where_no_viewer_comes_up_says_so_and_leaves_nothing(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    from landing_sim import cli
+    from landing_sim.record import replay
+
+    def fail() -> str:
+        raise replay.ReplayError("no live view")
+
+    monkeypatch.setattr(replay, "start_live_viewer", fail)
+    with pytest.raises(ConfigError, match=r"^--live: \(file\): no live view$"):
+        cli.run("do128/gust", list(SHORT[1:]), out=tmp_path / "o", live=True)
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(("name", "message"), [("gone", "is a link to nowhere"), ("x" * 300, "cannot be used: ")])
 def test_an_out_that_can_never_be_is_refused_before_flying(name: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "gone").symlink_to("nowhere")
