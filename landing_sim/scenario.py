@@ -199,7 +199,9 @@ class Filter(Section):
     )
     believed_width_m: float | None = Field(None, gt=0, le=200, description="null = the true width")
     compensate_latency: bool = Field(True, description="apply an image at the time it was exposed")
-    gate_sigma: float | None = Field(4.0, gt=0, le=100, description="reject a window beyond this; null = no gate")
+    gate_sigma: Annotated[float, Field(gt=0, le=100)] | Literal["auto"] | None = Field(
+        "auto", description="reject a window beyond this; null = no gate; auto = 4 if wind is estimated, else no gate"
+    )
 
 
 class Believed(Section):
