@@ -119,7 +119,7 @@ def design(
 
     craft = vehicle.load(aircraft)
     try:
-        result = control.design(craft.control, linear_models(paths.aircraft_folder(aircraft), craft.control))
+        result = control.design(craft.control, linear_models(paths.aircraft_folder(aircraft), craft.control, craft.mass_kg))
     except (PlantError, ValueError) as error:
         raise ConfigError([Problem(Mark(aircraft), (), f"cannot be designed for: {error}")]) from error
     if json_:

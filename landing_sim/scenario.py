@@ -81,13 +81,12 @@ class Runway(Section):
 
     width_m: float = Field(29.0, gt=0, le=200, description="between the borderlines")
     length_m: float = Field(1680.0, gt=0, le=8000, description="threshold to far end")
-    slope_percent: float = Field(0.0, ge=-3, le=3, description="rise along the landing direction")
+    slope_percent: float = Field(0.0, ge=-2, le=2, description="rise along the landing direction")
     elevation_m: float = Field(0.0, ge=-450, le=5000, description="threshold above the ellipsoid")
     heading_deg: float = Field(262.0, ge=0, le=360, description="true course of the landing direction")
     latitude_deg: float = Field(52.32, ge=-85, le=85, description="threshold, WGS 84")
     longitude_deg: float = Field(10.55, ge=-180, le=180, description="threshold, WGS 84")
     markings: bool = Field(True, description="paint ICAO markings")
-    side_stripes: bool = Field(False, description="paint side stripes too; what is measured is the edge to the grass")
     taxiways: tuple[Taxiway, ...] = Field((), max_length=20, description="exits that break the borderlines")
     grey: GreyLevels = Field(GreyLevels(), description="brightness of the scene")
 
@@ -212,6 +211,12 @@ class Believed(Section):
     )
     mass_sigma: float = Field(0.03, ge=0, le=0.5, description="1 sigma of the relative error of mass and inertia")
     focal_scale: float = Field(1.0, ge=0.5, le=2, description="believed over true focal length")
+    encoder_sigma_deg: float = Field(
+        0.03, ge=0, le=5, description="what the data sheet says of the platform's constant angle error, 1 sigma"
+    )
+    pointing_sigma_deg: float = Field(
+        0.7, ge=0, le=5, description="how well the camera is turned to the runway at the start, 1 sigma, cut at 2"
+    )
 
 
 class Control(Section):

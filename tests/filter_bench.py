@@ -100,9 +100,7 @@ def pose(x: np.ndarray, t: float, rng: np.random.Generator) -> Measurement:
     truth = x[[states.X, states.Y, states.H, states.PHI, states.THETA, states.PSI]].copy()
     truth[4] -= x[states.ETILT]
     truth[5] -= x[states.EPAN]
-    variance = sd**2
-    variance[4:] += np.deg2rad(0.03) ** 2  # the encoder's bias is in it
-    return Measurement("pose", t, t, truth + sd * rng.normal(size=6), np.diag(variance))
+    return Measurement("pose", t, t, truth + sd * rng.normal(size=6), np.diag(sd**2))
 
 
 def inertial(x: np.ndarray, t: float, rng: np.random.Generator, config: FilterConfig) -> list[Measurement]:

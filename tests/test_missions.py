@@ -80,6 +80,15 @@ def test_sloping_runways_are_landed_on(slope: float) -> None:
     assert flight.verdict.metrics["height_runway_m"] < 0.2
 
 
+def test_an_approach_that_never_finds_the_runway_climbs_away() -> None:
+    """Nothing to be seen (the runway as dark as the grass): no blind flight into the ground."""
+    flight = fly("do128/calm", "runway.grey.surface=90", "runway.markings=false", "time.limit_s=20")
+    log = flight.log
+    assert not log["valid"].any()
+    assert flight.log.touchdown is None
+    assert log["true_H_m"][-1] > 60.0
+
+
 # ------------------------------------------------------------------------------------------------ width
 
 
@@ -139,11 +148,15 @@ def test_edges_grown_by_opencv_cost_range() -> None:
 
 
 def test_an_image_taken_for_newer_than_it_is_shifts_range_by_its_age() -> None:
-    """120 ms at 50 m/s: the aircraft believes itself 6 m behind where it is. Compensated, the shift is gone."""
+    """120 ms at 50 m/s: the aircraft believes itself 6 m behind where it is. Compensated, the shift is gone.
+
+    Measured at the start, before the loop that flies on stale attitudes has departed from its path.
+    """
     late = ("camera.latency_s=0.12", "filter.gate_sigma=null", *STRAIGHT_IN)
     naive = fly("do128/calm", "filter.compensate_latency=false", *late).log
     rewound = fly("do128/calm", *late).log
-    assert np.mean(naive.error("x")[approach(naive)]) == pytest.approx(-6.0, abs=0.6)
+    early = approach(naive) & (naive["t_s"] < 2.5)
+    assert np.mean(naive.error("x")[early]) == pytest.approx(-6.0, abs=1.0)
     assert abs(np.mean(rewound.error("x")[approach(rewound)])) < 0.5
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from landing_sim.world.markings import runway_markings, stripe_count
-from landing_sim.world.runway import PAINT, SURFACE, Greys, Runway, Taxiway
+from landing_sim.world.runway import GRASS, PAINT, SURFACE, Greys, Runway, Taxiway
 
 
 def test_threshold_stripes_of_the_default_runway() -> None:
@@ -38,7 +38,7 @@ def test_stripes_by_width(width: float, count: int) -> None:
 @pytest.mark.parametrize("width", [8.0, 18.0, 23.0, 29.0, 45.0, 80.0])
 @pytest.mark.parametrize("length", [50.0, 300.0, 799.0, 1000.0, 1680.0, 4000.0])
 def test_paint_stays_on_the_runway_and_apart(width: float, length: float) -> None:
-    marks = runway_markings(width, length, side_stripes=True)
+    marks = runway_markings(width, length)
     for m in marks:
         assert 0.0 <= m.x0 < m.x1 <= length
         assert -width / 2 <= m.y0 < m.y1 <= width / 2
@@ -62,7 +62,7 @@ def test_quads_run_the_same_way_round_and_are_convex() -> None:
     runway = Runway(taxiways=(Taxiway(300.0, side="left"), Taxiway(600.0), Taxiway(6.0, flare=0.0)), slope=0.01)
     points, material = runway.quads()
     assert points.shape == (len(material), 4, 3)
-    assert Counter(material.tolist()) == {SURFACE: 6, PAINT: len(runway.markings)}
+    assert Counter(material.tolist()) == {GRASS: 1, SURFACE: 6, PAINT: len(runway.markings)}
     for quad in points:
         edges = np.roll(quad, -1, axis=0) - quad
         turns = np.cross(edges, np.roll(edges, -1, axis=0))[:, 2]

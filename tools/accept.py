@@ -52,6 +52,7 @@ LANDED = Promise("landed", "share", 1.0)
 WEATHER = (
     LANDED,
     Promise("touchdown_y_m", "max", high=3.0),
+    Promise("sink_rate_mps", "p95", high=1.5),
     Promise("sink_rate_mps", "max", high=1.5),
     Promise("touchdown_x_m", "min", low=250.0),
     Promise("touchdown_x_m", "max", high=900.0),

@@ -33,6 +33,7 @@ class GuidanceMemory:
     downdraught: float = 0.0  # [m/s] smoothed, R's z
     waiting: float = 0.0  # [s] for how long touchdown or instability has been suspected
     bounced: bool = False  # airborne again after touchdown
+    blind: float = 0.0  # [s] looked for the runway in vain
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of a go-around: time [s], height [m], climb rate [m/s]
 
 
@@ -129,9 +130,18 @@ class LandingGuidance:
         return GuidanceMemory()
 
     def step(self, memory: GuidanceMemory, estimate: Estimate) -> tuple[GuidanceMemory, Reference]:
-        if memory.mode == "acquire" and not estimate.valid:
-            return replace(memory, t=estimate.t), Reference(
-                "acquire", self.path.approach, 0.0, -self.path.slope * self.path.approach, 0.0, 0.0, 0.0
+        if not estimate.valid and not math.isfinite(memory.seen):
+            blind = memory.blind + (estimate.t - memory.t if math.isfinite(memory.t) else 0.0)
+            mode = "acquire" if blind < self.settings.go_around.acquire_s else "go_around"
+            return replace(memory, mode=mode, t=estimate.t, blind=blind), Reference(
+                mode,
+                self.path.approach,
+                0.0,
+                -self.path.slope * self.path.approach,
+                0.0,
+                0.0,
+                0.0,
+                extra={"blind": 1.0},
             )
         b = believed(estimate)
         m = motion(b)
@@ -141,7 +151,7 @@ class LandingGuidance:
         share = dt / (dt + self.settings.decrab.wind_filter_s) if math.isfinite(memory.seen) else 1.0
         crosswind = memory.crosswind + share * (b.wy - memory.crosswind)
         downdraught = memory.downdraught + share * (b.wz - memory.downdraught)
-        started = mode == "go_around" and memory.mode != mode
+        started = mode == "go_around" and (memory.mode != mode or not math.isfinite(memory.seen))
         memory = GuidanceMemory(
             mode,
             estimate.t,
@@ -150,6 +160,7 @@ class LandingGuidance:
             downdraught,
             waiting,
             memory.bounced or (memory.mode == "rollout" and mode == "decrab"),
+            memory.blind,
             (estimate.t, b.H, m.H_dot) if started else memory.start,
         )
         if mode == "rollout" or mode == "stopped":

@@ -44,10 +44,11 @@ class ControlMemory:
 class LandingController:
     """interfaces.Controller. Constants only; all memory is in ControlMemory."""
 
-    __slots__ = ("_camera", "_flaps", "_ground_effect", "_integral", "_limits", "_rollout", "_schedule", "_slowest",
-                 "_thrust", "_trim")  # fmt: skip
+    __slots__ = ("_camera", "_flaps", "_ground_effect", "_integral", "_limits", "_look", "_rollout", "_schedule",
+                 "_slowest", "_thrust", "_trim")  # fmt: skip
 
-    def __init__(self, design: Design) -> None:
+    def __init__(self, design: Design, look: tuple[float, float] = (0.0, 0.0)) -> None:
+        """look: pan and tilt [rad] that the platform is held at until the runway is found."""
         s = design.settings
         points = sorted(design.points, key=lambda p: p.model.airspeed)
         self._schedule = Schedule(tuple(p.model.airspeed for p in points), tuple(_row(p) for p in points))
@@ -59,7 +60,7 @@ class LandingController:
                              for a in (s.elevator, s.aileron, s.rudder))  # fmt: skip
         self._integral = (s.integral_limits["int_V"], s.integral_limits["int_H"])
         c = s.camera
-        self._camera = tuple(math.radians(a) for a in (c.elevation_deg, c.search_pan_deg, c.search_tilt_deg, c.max_deg))
+        self._camera, self._look = (math.radians(c.elevation_deg), math.radians(c.max_deg)), look
         self._flaps = (s.flap, s.flap if s.rollout.flap is None else s.rollout.flap)
         self._ground_effect = s.ground_effect
         self._rollout = Rollout(s.rollout)
@@ -68,13 +69,13 @@ class LandingController:
         return ControlMemory()
 
     def step(self, memory: ControlMemory, estimate: Estimate, reference: Reference) -> tuple[ControlMemory, Command]:
-        elevation, pan, tilt, most = self._camera
-        if reference.mode == "acquire":
-            if np.isfinite(estimate.mean).all():
-                pan, tilt = look_along(estimate["phi"], estimate["theta"], estimate["psi"], 0.0, elevation)
+        elevation, most = self._camera
+        if reference.mode == "acquire" or "blind" in reference.extra:
+            # nothing to fly by: the trim it began in, or with full power a blind climb
             elevator, throttle = self._trim
+            throttle = 1.0 if reference.mode == "go_around" else throttle
             return ControlMemory(estimate.t, "acquire", elevator=elevator), Command(
-                elevator, 0.0, 0.0, throttle, self._flaps[0], 0.0, 0.0, _clip(pan, most), _clip(tilt, most)
+                elevator, 0.0, 0.0, throttle, self._flaps[0], 0.0, 0.0, *self._look
             )
         b = believed(estimate)
         m = motion(b)

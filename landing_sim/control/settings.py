@@ -169,8 +169,6 @@ class CameraSettings:
     """Where the platform looks: the runway's direction, raised by elevation_deg; before acquisition, these angles."""
 
     elevation_deg: float = 0.0
-    search_pan_deg: float = 0.0
-    search_tilt_deg: float = 0.0
     max_deg: float = 60.0
 
     __pydantic_config__ = _STRICT
@@ -293,6 +291,7 @@ class GoAroundSettings:
     blackout_s: float
     climb_deg: float
     pull_mps2: float = 1.5
+    acquire_s: float = 3.0  # without a runway found: climb away
 
     __pydantic_config__ = _STRICT
 

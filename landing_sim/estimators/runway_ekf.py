@@ -163,12 +163,12 @@ class RunwayEkf:
     def _start(self, memory: Memory, m: Measurement) -> Memory:
         """From an acquired pose: velocity from the airspeed and the approach angle, rates from the gyros.
 
-        A filter that flies blind takes a pose only if it is where it may be, until it has been blind for too long.
+        A filter that flies blind takes a pose only if it is where it may be; the longer it is blind, the more may be.
         """
         c, idx = self.config, self.blocks.index
         x = memory.x.copy()
         pose = [states.X, states.Y, states.H, states.PHI, states.THETA, states.PSI]
-        if memory.valid and memory.misses < c.blind_after:
+        if memory.valid:
             rows = [int(np.flatnonzero(idx == state)[0]) for state in pose]
             off = m.z - x[pose]
             S = self._covariance(memory)[np.ix_(rows, rows)] + m.R
@@ -187,9 +187,9 @@ class RunwayEkf:
         P[np.ix_(pose, pose)] = m.R
         # the encoder's errors are in the acquired attitude as well
         if states.EPAN in idx:
-            for angle, bias, jitter in ((states.PSI, *states.ENCODER[::2]), (states.THETA, *states.ENCODER[1::2])):
-                P[angle, angle] += var[jitter]  # the bias is in m.R already
-                for error in (bias, jitter):
+            for angle, errors in ((states.PSI, states.ENCODER[::2]), (states.THETA, states.ENCODER[1::2])):
+                for error in errors:
+                    P[angle, angle] += var[error]
                     P[angle, error] = P[error, angle] = var[error]
         if c.width == "state":  # the acquired lengths hold for the width they were acquired with
             scale = np.zeros(states.N)

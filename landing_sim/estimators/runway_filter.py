@@ -46,8 +46,7 @@ class FilterConfig:
     watchdog_share: float = 0.35  # smoothed share of rejected edges that means "locked out"
     watchdog_memory: float = 5.0  # frames
     lost_after: int = 30  # frames without edges
-    pose_gate: float = 5.0  # a pose further off than this many sigma is not believed ...
-    blind_after: int = 150  # ... before this many frames without edges
+    pose_gate: float = 5.0  # when flying blind: a pose further off than this many sigma is not believed
     approach_angle: float = -3.0 * RAD  # believed flight path while nothing is known
 
 

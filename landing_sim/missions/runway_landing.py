@@ -138,12 +138,12 @@ def build(scenario: Scenario, vehicle: Vehicle, seed: int, run: int = 0) -> Miss
 
     clock = loop.Clock.of(scenario.time.step_s, scenario.time.cycle_s, scenario.control.delay_s)
     wind = _wind(scenario, noise("turbulence"))
-    platform = _platform(scenario, vehicle)
+    platform = _platform(scenario, vehicle, noise("operator"))
     plant = _plant(scenario, vehicle, platform, wind)
     sensors = _sensors(scenario, plant, platform, noise)
     camera = _believed_camera(scenario, vehicle)
     settings = _control_settings(scenario, vehicle)
-    planned = _design(paths.aircraft_folder(scenario.aircraft.model), settings)
+    planned = _design(paths.aircraft_folder(scenario.aircraft.model), settings, vehicle.mass_kg)
     return Mission(
         scenario,
         Parts(
@@ -154,7 +154,7 @@ def build(scenario: Scenario, vehicle: Vehicle, seed: int, run: int = 0) -> Miss
             _front_ends(scenario, camera),
             _estimator(scenario, vehicle, camera, noise("believed")),
             LandingGuidance(vehicle.guidance, math.atan(scenario.runway.slope_percent / 100.0)),
-            LandingController(planned),
+            LandingController(planned, (platform.pan, platform.tilt)),
         ),
     )
 
@@ -169,7 +169,6 @@ def _runway(scenario: Scenario) -> Runway:
         length=r.length_m,
         slope=math.atan(r.slope_percent / 100.0),
         painted=r.markings,
-        side_stripes=r.side_stripes,
         taxiways=tuple(Taxiway(t.x_m, t.width_m, t.side, t.flare_m) for t in r.taxiways),
         greys=Greys(sky=r.grey.sky, grass=r.grey.grass, surface=r.grey.surface, paint=r.grey.marking),
     )
@@ -193,17 +192,18 @@ def _wind(scenario: Scenario, noise: Noise) -> Wind:
     return Wind(config, noise)
 
 
-def _platform(scenario: Scenario, vehicle: Vehicle) -> PanTilt:
-    """The camera mount, turned to where the runway is thought to be: an operator's job, good to a degree or so."""
+def _platform(scenario: Scenario, vehicle: Vehicle, noise: Noise) -> PanTilt:
+    """The camera mount, turned by an operator to where the runway is thought to be."""
     p, start = scenario.camera.platform, scenario.initial
+    off = math.radians(scenario.believed.pointing_sigma_deg) * np.clip(noise.normal(2), -2.0, 2.0)
     return PanTilt(
         lag=p.lag_s,
         rate_limit=math.radians(p.rate_limit_dps),
         pan_limit=math.radians(vehicle.camera.pan_limit_deg),
         tilt_limit=math.radians(vehicle.camera.tilt_limit_deg),
         stabilisation=p.stabilisation,
-        pan=-math.radians(start.heading_deg),
-        tilt=-math.radians(start.flight_path_deg),
+        pan=-math.radians(start.heading_deg) + float(off[0]),
+        tilt=-math.radians(start.flight_path_deg) + float(off[1]),
     )
 
 
@@ -271,7 +271,8 @@ def _believed_camera(scenario: Scenario, vehicle: Vehicle) -> BelievedCamera:
         vehicle.camera.p_BC_m,
         c.blur_px,
         max(c.noise_dn, 0.3),  # grey levels are whole numbers: never less than their rounding
-        math.radians(abs(c.platform.encoder_bias_deg)),
+        # a filter that estimates the encoders' error adds it to an acquired attitude itself
+        0.0 if scenario.filter.kind == "augmented" else math.radians(scenario.believed.encoder_sigma_deg),
     )
 
 
@@ -317,13 +318,14 @@ def _estimator(scenario: Scenario, vehicle: Vehicle, camera: BelievedCamera, noi
         width=f.width,
         process_noise=f.process_noise,
         gate_sigma=_gate(f.gate_sigma, f.kind),
-        encoder_sigma=camera.encoder_sigma,
+        encoder_sigma=math.radians(b.encoder_sigma_deg),
         encoder_noise=math.radians(scenario.camera.platform.encoder_noise_deg),
         gyro_bias_sigma=math.radians(scenario.sensors.gyro.bias_dps),
     )
+    believed = replace(vehicle.believed, rho=_air_density(scenario), mass=vehicle.mass_kg)
     ekf = RunwayEkf(
         config,
-        replace(vehicle.believed, rho=_air_density(scenario)).perturbed(noise, b.aero_sigma, b.mass_sigma),
+        believed.perturbed(noise, b.aero_sigma, b.mass_sigma),
         camera.intrinsics,
         np.array(camera.p_BC),
         _believed_width(scenario),
@@ -349,26 +351,27 @@ def _air_density(scenario: Scenario) -> float:
 
 
 def _control_settings(scenario: Scenario, vehicle: Vehicle) -> ControlSettings:
-    c, rho = vehicle.control, scenario.control.rho
-    return replace(c, longitudinal=replace(c.longitudinal, rho=rho), lateral=replace(c.lateral, rho=rho))
+    c, rho, flap = vehicle.control, scenario.control.rho, scenario.aircraft.flap
+    axes = {name: replace(getattr(c, name), rho=rho) for name in ("longitudinal", "lateral")}
+    return replace(c, flap=c.flap if flap is None else flap, **axes)
 
 
 _designs: dict[tuple[Path, str], Design] = {}
 
 
-def _design(folder: Path, settings: ControlSettings) -> Design:
+def _design(folder: Path, settings: ControlSettings, mass: float) -> Design:
     """Gains from the nominal aircraft, never from the dispersed one; made once a process."""
-    key = (folder, repr(settings))
+    key = (folder, f"{mass!r} {settings!r}")
     if key not in _designs:
-        _designs[key] = design(settings, linear_models(folder, settings))
+        _designs[key] = design(settings, linear_models(folder, settings, mass))
     return _designs[key]
 
 
-def linear_models(folder: Path, settings: ControlSettings) -> list[LinearModel]:
+def linear_models(folder: Path, settings: ControlSettings, mass: float) -> list[LinearModel]:
     """The nominal aircraft linearised at the controller's trim points."""
     models = []
     for wanted in settings.trim_points:
-        point = trim(folder, wanted.airspeed_mps, math.radians(wanted.flight_path_deg), settings.flap)
+        point = trim(folder, wanted.airspeed_mps, math.radians(wanted.flight_path_deg), settings.flap, mass)
         linear = linearise(folder, point)
         V, alpha = point.airspeed, point.alpha
         state = np.zeros(12)

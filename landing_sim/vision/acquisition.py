@@ -187,7 +187,7 @@ class Acquisition:
             return None
         # open ground in front of the threshold, and on either side of what lies behind it
         rho = nearest - k / scale
-        end = min(k + 40, len(g), int(scale * (nearest - rho / (1.0 + rho * self._runway.length))))
+        end = min(len(g), max(k + 8, int(scale * (nearest - rho / (1.0 + rho * self._runway.length))) - 4))
         for side in (-1.0, 1.0):
             lines = side * np.array([0.65, 0.75]) * self._runway.width - y
             rise = g[:end] - depth_profile(image, R_CD, self._lens, height, lines, nearest, end)
@@ -195,7 +195,9 @@ class Acquisition:
             before, behind = before[np.isfinite(before)], behind[np.isfinite(behind)]
             if len(before) and abs(np.mean(before)) > 0.5 * peak:
                 return None
-            if len(behind) and abs(np.mean(behind)) < 0.4 * peak:
+            # all the way to its far end: a painted block has edges like a runway's, but is shorter for its width
+            parts = np.array_split(behind, max(1, min(4, len(behind) // 8)))
+            if any(len(part) and abs(np.mean(part)) < 0.4 * peak for part in parts):
                 return None
         rho = nearest - (k + 0.5 * (more - less) / (2.0 * peak - more - less)) / scale
         ray = R_CD @ np.array([1.0, -rho * y, rho * height])

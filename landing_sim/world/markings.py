@@ -24,7 +24,6 @@ TOUCHDOWN_LENGTH, TOUCHDOWN_WIDTH, TOUCHDOWN_SPACING = 22.5, 3.0, 150.0
 TOUCHDOWN_CLEAR_OF_AIMING_POINT = 50.0  # a pair nearer than this to the aiming point is left out
 
 CENTRELINE_START, CENTRELINE_DASH, CENTRELINE_GAP, CENTRELINE_WIDTH = 69.0, 30.0, 20.0, 0.45
-SIDE_STRIPE_WIDTH = 0.45
 CLEAN_MARGIN = 3.0  # [m] from the runway's edge kept free of aiming point and touchdown-zone marks
 
 
@@ -32,7 +31,7 @@ CLEAN_MARGIN = 3.0  # [m] from the runway's edge kept free of aiming point and t
 class Marking:
     """A white rectangle on the surface: x along the runway from the threshold, y to the right of its centreline [m]."""
 
-    kind: str  # "threshold", "centreline", "aiming_point", "touchdown_zone", "side_stripe"
+    kind: str  # "threshold", "centreline", "aiming_point", "touchdown_zone"
     x0: float
     x1: float
     y0: float
@@ -44,19 +43,12 @@ def stripe_count(width: float) -> int:
     return next((n for least, n in STRIPES_BY_WIDTH if width >= least), 0)
 
 
-def runway_markings(width: float, length: float, side_stripes: bool = False) -> tuple[Marking, ...]:
+def runway_markings(width: float, length: float) -> tuple[Marking, ...]:
     """All markings of a runway [m], both ends; those of an end that would pass mid-length are left out."""
     near = [*_threshold(width), *_aiming_point(width, length), *_touchdown_zone(width, length)]
     near = [m for m in near if m.x1 <= 0.5 * length]
     far = [Marking(m.kind, length - m.x1, length - m.x0, -m.y1, -m.y0) for m in near]
-    stripes = []
-    if side_stripes:
-        inner = 0.5 * width - SIDE_STRIPE_WIDTH
-        stripes = [
-            Marking("side_stripe", 0.0, length, -0.5 * width, -inner),
-            Marking("side_stripe", 0.0, length, inner, 0.5 * width),
-        ]
-    return (*stripes, *near, *far, *_centreline(length))
+    return (*near, *far, *_centreline(length))
 
 
 def _both_sides(kind: str, x0: float, x1: float, inner: float, outer: float) -> list[Marking]:

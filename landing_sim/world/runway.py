@@ -70,7 +70,6 @@ class Runway:
     length: float = 1680.0  # [m] along the surface
     slope: float = 0.0  # [rad] > 0 uphill
     painted: bool = True
-    side_stripes: bool = False  # off: what is measured is the edge between surface and grass
     taxiways: tuple[Taxiway, ...] = ()
     greys: Greys = field(default_factory=Greys)
 
@@ -87,7 +86,7 @@ class Runway:
 
     @property
     def markings(self) -> tuple[Marking, ...]:
-        return runway_markings(self.width, self.length, self.side_stripes) if self.painted else ()
+        return runway_markings(self.width, self.length) if self.painted else ()
 
     def to_R(self, xy: Array) -> Array:
         """(..., 3) [m], frame R, of points (..., 2) of the surface: along it from the threshold, and to the right."""
