@@ -116,9 +116,7 @@ def simulate(
             estimate,
             reference,
             command,
-            None if seen is None else seen.innovation,
-            float("nan") if seen is None else seen.nis,
-            0 if seen is None else seen.dof,
+            seen,
         )
 
         # the world moves on

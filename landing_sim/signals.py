@@ -247,6 +247,4 @@ class Step:
     estimate: Estimate
     reference: Reference
     command: Command
-    innovation: Array | None = None  # (n,) [px] for the last "edges" measurement, as the estimator saw it
-    nis: float = float("nan")  # normalised innovation squared of that update
-    nis_dof: int = 0
+    residuals: Residuals | None = None  # of the image that came in this cycle, if one did

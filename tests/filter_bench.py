@@ -18,7 +18,7 @@ from landing_sim.signals import Command, EdgeSet, Measurement
 CAMERA = Intrinsics.centred(512, 512, 2000.0)
 LEVER = np.array([3.0, 0.0, -0.3])
 WIDTH = 29.0
-ENCODER_NOISE = np.deg2rad(0.005)
+ENCODER_NOISE, GYRO_NOISE = np.deg2rad(0.005), np.deg2rad(0.1)
 COMMAND = Command(elevator=0.005, throttle=0.32, flap=0.5)
 
 
@@ -106,11 +106,11 @@ def pose(x: np.ndarray, t: float, rng: np.random.Generator) -> Measurement:
 def inertial(x: np.ndarray, t: float, rng: np.random.Generator, config: FilterConfig) -> list[Measurement]:
     from landing_sim.estimators.inertial_model import airspeed_model
 
-    gyro = x[3:6] + x[states.BP : states.BR + 1] + config.gyro_sigma * rng.normal(size=3)
+    gyro = x[3:6] + x[states.BP : states.BR + 1] + GYRO_NOISE * rng.normal(size=3)
     nu, _ = airspeed_model(x, 0.0)
     speed = np.array([-nu[0] + config.airspeed_sigma * rng.normal()])
     return [
-        Measurement("gyro", t, t, gyro, np.full(3, config.gyro_sigma**2)),
+        Measurement("gyro", t, t, gyro, np.full(3, GYRO_NOISE**2)),
         Measurement("airspeed", t, t, speed, np.array([config.airspeed_sigma**2])),
     ]
 

@@ -161,9 +161,7 @@ def _step(truth: Truth, error: np.ndarray, valid: bool, k: int) -> Step:
     )
     command = Command(elevator=0.02, throttle=0.4)
     measurements = (measurement,)
-    return Step(
-        truth, camera, samples, measurements, estimate, reference, command, innovation, residuals.nis, residuals.dof
-    )
+    return Step(truth, camera, samples, measurements, estimate, reference, command, residuals)
 
 
 def _edges(truth: Truth, camera: CameraTruth, k: int) -> tuple[Measurement, np.ndarray]:

@@ -86,11 +86,11 @@ def test_same_flight_same_bytes_other_seed_other_bytes(tmp_path):
 
 def test_the_gate_has_the_last_word_on_a_window():
     step = next(iter(synthetic.fly()))
-    seen = step.estimate.residuals
+    seen = step.residuals
     status = seen.status.copy()
     status[3] = Status.REJECTED
-    gated = replace(step.estimate, residuals=Residuals(seen.innovation, status, seen.nis, seen.dof))
-    assert build([replace(step, estimate=gated)])["window_status"][0, 3] == Status.REJECTED
+    gated = Residuals(seen.innovation, status, seen.nis, seen.dof)
+    assert build([replace(step, residuals=gated)])["window_status"][0, 3] == Status.REJECTED
 
 
 def test_a_filter_that_changes_its_states_in_flight_is_an_error():

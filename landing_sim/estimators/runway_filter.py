@@ -24,8 +24,7 @@ class FilterConfig:
     width: Literal["known", "state", "separate"] = "known"
     process_noise: Literal["integrated", "constant"] = "integrated"  # eq. (9), or the constant Q of eqs. (13)-(14)
     gate_sigma: float | None = 4.0
-    gyro_sigma: float = 0.1 * RAD  # [rad/s]
-    airspeed_sigma: float = 0.5  # [m/s]
+    airspeed_sigma: float = 0.5  # [m/s] of a reading, for the separate width filter
     encoder_sigma: float = 0.03 * RAD  # [rad] prior of the platform's encoder bias
     encoder_noise: float = 0.005 * RAD  # [rad] of each reading, common to all edges of an image
     gyro_bias_sigma: float = 0.1 * RAD

@@ -140,7 +140,7 @@ def build(scenario: Scenario, vehicle: Vehicle, seed: int, run: int = 0) -> Miss
     wind = _wind(scenario, noise("turbulence"))
     platform = _platform(scenario, vehicle, noise("operator"))
     plant = _plant(scenario, vehicle, platform, wind)
-    sensors = _sensors(scenario, plant, platform, noise)
+    sensors = _sensors(scenario, platform, noise)
     camera = _believed_camera(scenario, vehicle)
     settings = _control_settings(scenario, vehicle)
     planned = _design(paths.aircraft_folder(scenario.aircraft.model), settings, vehicle.mass_kg)
@@ -235,9 +235,7 @@ def _plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt, wind: Wind) 
     )
 
 
-def _sensors(
-    scenario: Scenario, plant: JsbsimPlant, platform: PanTilt, noise: Callable[[str], Noise]
-) -> tuple[Sensor, ...]:
+def _sensors(scenario: Scenario, platform: PanTilt, noise: Callable[[str], Noise]) -> tuple[Sensor, ...]:
     """Inertial first: what the camera's front end is told rests on them."""
     cycle, c, p, s = scenario.time.cycle_s, scenario.camera, scenario.camera.platform, scenario.sensors
     bias = math.radians(p.encoder_bias_deg)
@@ -305,7 +303,7 @@ def _front_ends(scenario: Scenario, camera: BelievedCamera) -> dict[str, FrontEn
     return {
         "camera": front_end,
         "gyro": Reading("gyro", "gyro", math.radians(max(s.gyro.noise_dps, 0.01))),
-        "airspeed": Reading("airspeed", "airspeed", max(s.airspeed.noise_mps, 0.05)),
+        "airspeed": Reading("airspeed", "airspeed", _airspeed_sigma(scenario)),
         "squat": Reading("squat", "on_ground", 0.0),
     }
 
@@ -318,6 +316,7 @@ def _estimator(scenario: Scenario, vehicle: Vehicle, camera: BelievedCamera, noi
         width=f.width,
         process_noise=f.process_noise,
         gate_sigma=_gate(f.gate_sigma, f.kind),
+        airspeed_sigma=_airspeed_sigma(scenario),
         encoder_sigma=math.radians(b.encoder_sigma_deg),
         encoder_noise=math.radians(scenario.camera.platform.encoder_noise_deg),
         gyro_bias_sigma=math.radians(scenario.sensors.gyro.bias_dps),
@@ -335,6 +334,10 @@ def _estimator(scenario: Scenario, vehicle: Vehicle, camera: BelievedCamera, noi
     if latency > 0.0 and f.compensate_latency:
         return Rewind(ekf, latency + 2.0 * scenario.time.cycle_s)
     return ekf
+
+
+def _airspeed_sigma(scenario: Scenario) -> float:
+    return max(scenario.sensors.airspeed.noise_mps, 0.05)
 
 
 def _gate(wanted: float | str | None, kind: str) -> float | None:

@@ -164,7 +164,8 @@ class LogBuilder:
                 row[_M + 3] = sample.data
             elif isinstance(sample.data, CameraSample):
                 row[_M + 4 : _M + 7] = sample.data.pan, sample.data.tilt, sample.data.index
-        row[_N], row[_N + 1] = step.nis, step.nis_dof
+        seen = step.residuals
+        row[_N], row[_N + 1] = (np.nan, 0.0) if seen is None else (seen.nis, seen.dof)
         if estimate.names != self._names:
             self._start(estimate.names)
         self._mean[k] = estimate.mean
@@ -177,7 +178,7 @@ class LogBuilder:
         self._rotations.append(truth.R_RB)
         for measurement in step.measurements:
             if measurement.geometry is not None:
-                self._edges.append((k, measurement.geometry, measurement.z, estimate.residuals))
+                self._edges.append((k, measurement.geometry, measurement.z, seen))
         self._n = k + 1
 
     def finish(

@@ -95,7 +95,7 @@ class Recorder:
         edges = next((m for m in step.measurements if m.geometry is not None), None)
         if edges is not None and edges.geometry is not None:
             geometry = edges.geometry
-            residuals = step.estimate.residuals
+            residuals = step.residuals
             judged = (
                 geometry.status
                 if residuals is None or len(residuals.status) != len(geometry.status)
