@@ -208,6 +208,8 @@ def _fly(
         except ReplayError as error:
             raise ConfigError([Problem(Mark("--live" if live else f"--out {folder}"), (), str(error))]) from None
         result = runner.write(flight, scenario, label, work, folder)
+    if flight.log.meta.get("reason"):
+        typer.echo(f"the flight model gave up: {flight.log.meta['reason']}", err=True)
     if as_json:
         typer.echo(json.dumps(result, allow_nan=False))
     else:

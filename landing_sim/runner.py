@@ -81,6 +81,7 @@ def fly(
         touchdown=outcome.touchdown,
         end=outcome.end,
         runway={"width_m": scenario.runway.width_m, "length_m": scenario.runway.length_m},
+        extra={"reason": outcome.reason} if outcome.reason else None,
     )
     if recorder is not None:
         recorder.close(flown)

@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 from flights import approach, fly, worst
 
+from landing_sim import runner, scenario, vehicle
+from landing_sim.plants.aircraft import JsbsimPlant
+from landing_sim.plants.jsbsim import PlantError
 from landing_sim.record import parquet
 
 MOUTHS = "runway.taxiways=[{x_m: 60, width_m: 12, side: left, flare_m: 3}, {x_m: 400, side: right}]"
@@ -87,6 +90,17 @@ def test_an_approach_that_never_finds_the_runway_climbs_away() -> None:
     assert not log["valid"].any()
     assert flight.log.touchdown is None
     assert log["true_H_m"][-1] > 60.0
+
+
+def test_a_flight_model_that_gives_up_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(self: object, command: object, wind_R: object) -> None:
+        raise PlantError("the flight model's state is not finite")
+
+    monkeypatch.setattr(JsbsimPlant, "step", fail)
+    wanted = scenario.load("do128/calm")
+    flight = runner.fly(wanted, vehicle.load(wanted.aircraft.model))
+    assert flight.verdict.outcome == "numeric_error"
+    assert flight.log.meta["reason"] == "the flight model's state is not finite"
 
 
 # ------------------------------------------------------------------------------------------------ width

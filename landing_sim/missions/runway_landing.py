@@ -45,6 +45,8 @@ from landing_sim.world.wind import CrosswindStep, ExponentialGust, SteadyWind, W
 
 STOPPED = 0.5  # [m/s] over the ground
 GO_AROUND_ENDS = 300.0  # [m] beyond the threshold
+UPSET_ROLL, UPSET_PITCH = 1.0, 0.8  # [rad] beyond these it is falling, not flying
+UNDERGROUND = 30.0  # [m] below the threshold: where there is no ground
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +55,7 @@ class Outcome:
 
     end: str
     touchdown: Touchdown | None
+    reason: str = ""  # what the flight model said when it could not go on
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,12 +79,13 @@ class Mission:
         self.parts = parts
         self._limit = scenario.time.limit_s
         self._half_width, self._length = 0.5 * scenario.runway.width_m, scenario.runway.length_m
+        self._rise = scenario.runway.slope_percent / 100.0
         self._outcome: Outcome | None = None
 
     def steps(self) -> Iterator[Step]:
         """Fly to the end, a Step a control cycle. The last Step is the one that ended it."""
         p = self.parts
-        end = "time"
+        end, reason = "time", ""
         try:
             for step in loop.simulate(
                 p.clock,
@@ -99,9 +103,9 @@ class Mission:
                 if ended:
                     end = ended
                     break
-        except (PlantError, FloatingPointError):
-            end = "numeric_error"
-        self._outcome = Outcome(end, p.plant.touchdown)
+        except (PlantError, FloatingPointError) as error:
+            end, reason = "numeric_error", str(error)
+        self._outcome = Outcome(end, p.plant.touchdown, reason)
 
     def outcome(self) -> Outcome:
         """Raises RuntimeError before the flight is over."""
@@ -117,7 +121,8 @@ class Mission:
         touchdown = self.parts.plant.touchdown
         if touchdown is not None and touchdown.sink_rate > CRASH_SINK:
             return "crash"
-        if abs(truth.euler[0]) > 1.0 or abs(truth.euler[1]) > 0.8 or float(truth.p_RB[2]) > 30.0:
+        upset = abs(truth.euler[0]) > UPSET_ROLL or abs(truth.euler[1]) > UPSET_PITCH
+        if upset or float(truth.p_RB[2]) > UNDERGROUND + max(0.0, -self._rise * x):
             return "crash"
         if on_ground and (abs(y) > self._half_width or not 0.0 <= x <= self._length):
             return "off_runway"
