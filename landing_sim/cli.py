@@ -114,12 +114,14 @@ def design(
     """Trim, modes wanted and achieved, gains, stability margins."""
     from landing_sim import paths, vehicle
     from landing_sim.control import design as control
-    from landing_sim.missions.runway_landing import linear_models
+    from landing_sim.missions.onboard import linear_models
     from landing_sim.plants.jsbsim import PlantError
 
     craft = vehicle.load(aircraft)
     try:
-        result = control.design(craft.control, linear_models(paths.aircraft_folder(aircraft), craft.control, craft.mass_kg))
+        result = control.design(
+            craft.control, linear_models(paths.aircraft_folder(aircraft), craft.control, craft.mass_kg)
+        )
     except (PlantError, ValueError) as error:
         raise ConfigError([Problem(Mark(aircraft), (), f"cannot be designed for: {error}")]) from error
     if json_:

@@ -1,0 +1,150 @@
+"""The onboard side of one flight: what the crew and the designers believe, as concrete parts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from landing_sim.control.design import Design, LinearModel, design
+from landing_sim.control.settings import ControlSettings
+from landing_sim.estimators.readings import Reading
+from landing_sim.estimators.rewind import Rewind
+from landing_sim.estimators.runway_ekf import RunwayEkf
+from landing_sim.estimators.runway_filter import FilterConfig
+from landing_sim.geometry.pinhole import Intrinsics
+from landing_sim.interfaces import Estimator, FrontEnd
+from landing_sim.missions import truth
+from landing_sim.noise import Noise
+from landing_sim.plants.trim import linearise, trim
+from landing_sim.scenario import Scenario
+from landing_sim.signals import Feature
+from landing_sim.vehicle import Vehicle
+from landing_sim.vision.believed import BelievedCamera, RunwayMap, TaxiwayMouth, ThresholdStripes
+from landing_sim.vision.front_end import FrontEndConfig, RunwayFrontEnd
+from landing_sim.vision.windows import EdgeConfig
+from landing_sim.world.markings import stripe_count
+
+
+def believed_camera(scenario: Scenario, vehicle: Vehicle) -> BelievedCamera:
+    c = scenario.camera
+    return BelievedCamera(
+        Intrinsics.centred(c.width_px, c.height_px, c.focal_px * scenario.believed.focal_scale),
+        vehicle.camera.p_BC_m,
+        c.blur_px,
+        max(c.noise_dn, 0.3),  # grey levels are whole numbers: never less than their rounding
+        # a filter that estimates the encoders' error adds it to an acquired attitude itself
+        0.0 if scenario.filter.kind == "augmented" else math.radians(scenario.believed.encoder_sigma_deg),
+    )
+
+
+def _believed_width(scenario: Scenario) -> float:
+    believed = scenario.filter.believed_width_m
+    return scenario.runway.width_m if believed is None else believed
+
+
+def front_ends(scenario: Scenario, camera: BelievedCamera) -> dict[str, FrontEnd]:
+    runway, v, s = scenario.runway, scenario.vision, scenario.sensors
+    seen = truth.runway(scenario)
+    # marks come in pairs either side of the centreline: the map keeps how far out they reach
+    blocks = [m for m in seen.markings if m.kind in ("aiming_point", "touchdown_zone")]
+    paint = sorted({(m.x0, m.x1, -max(-m.y0, m.y1), max(-m.y0, m.y1)) for m in blocks if m.y1 > 0.0})
+    known = RunwayMap(
+        width=_believed_width(scenario),
+        length=runway.length_m,
+        slope=seen.slope,
+        stripes=ThresholdStripes(stripe_count(runway.width_m) if runway.markings else 0),
+        paint=tuple(paint),
+        brighter=runway.grey.surface > runway.grey.grass,
+        mouths=tuple(
+            TaxiwayMouth(*t.mouth, Feature.LEFT if t.side == "left" else Feature.RIGHT)
+            for t, wanted in zip(seen.taxiways, runway.taxiways)
+            if wanted.mapped
+        ),
+    )
+    config = FrontEndConfig(v.windows, v.platform_angle, edges=EdgeConfig(floor=v.edge_floor_px))
+    front_end = RunwayFrontEnd(known, camera, config)
+    return {
+        "camera": front_end,
+        "gyro": Reading("gyro", "gyro", math.radians(max(s.gyro.noise_dps, 0.01))),
+        "airspeed": Reading("airspeed", "airspeed", _airspeed_sigma(scenario)),
+        "squat": Reading("squat", "on_ground", 0.0),
+    }
+
+
+def estimator(scenario: Scenario, vehicle: Vehicle, camera: BelievedCamera, noise: Noise) -> Estimator:
+    f, b = scenario.filter, scenario.believed
+    config = FilterConfig(
+        kind=f.kind,
+        factorisation=f.factorisation,
+        width=f.width,
+        process_noise=f.process_noise,
+        gate_sigma=_gate(f.gate_sigma, f.kind),
+        airspeed_sigma=_airspeed_sigma(scenario),
+        encoder_sigma=math.radians(b.encoder_sigma_deg),
+        encoder_noise=math.radians(scenario.camera.platform.encoder_noise_deg),
+        gyro_bias_sigma=math.radians(scenario.sensors.gyro.bias_dps),
+    )
+    believed = replace(vehicle.believed, rho=_air_density(scenario), mass=vehicle.mass_kg)
+    ekf = RunwayEkf(
+        config,
+        believed.perturbed(noise, b.aero_sigma, b.mass_sigma),
+        camera.intrinsics,
+        np.array(camera.p_BC),
+        _believed_width(scenario),
+        math.atan(scenario.runway.slope_percent / 100.0),
+    )
+    latency = scenario.camera.latency_s
+    if latency > 0.0 and f.compensate_latency:
+        return Rewind(ekf, latency + 2.0 * scenario.time.cycle_s)
+    return ekf
+
+
+def _airspeed_sigma(scenario: Scenario) -> float:
+    return max(scenario.sensors.airspeed.noise_mps, 0.05)
+
+
+def _gate(wanted: float | str | None, kind: str) -> float | None:
+    """A filter that does not know of wind blames the edges for it: a gate would reject true ones."""
+    if isinstance(wanted, str):
+        return 4.0 if kind == "augmented" else None
+    return wanted
+
+
+def _air_density(scenario: Scenario) -> float:
+    """[kg/m^3] of the standard atmosphere where the approach begins: what an altimeter tells the crew."""
+    height = scenario.runway.elevation_m + 0.5 * scenario.initial.height_m
+    return 1.225 * (1.0 - 0.0065 * height / 288.15) ** 4.2559
+
+
+def control_settings(scenario: Scenario, vehicle: Vehicle) -> ControlSettings:
+    c, rho, flap = vehicle.control, scenario.control.rho, scenario.aircraft.flap
+    axes = {name: replace(getattr(c, name), rho=rho) for name in ("longitudinal", "lateral")}
+    return replace(c, flap=c.flap if flap is None else flap, **axes)
+
+
+_designs: dict[tuple[Path, str], Design] = {}
+
+
+def planned_design(folder: Path, settings: ControlSettings, mass: float) -> Design:
+    """Gains from the nominal aircraft, never from the dispersed one; made once a process."""
+    key = (folder, f"{mass!r} {settings!r}")
+    if key not in _designs:
+        _designs[key] = design(settings, linear_models(folder, settings, mass))
+    return _designs[key]
+
+
+def linear_models(folder: Path, settings: ControlSettings, mass: float) -> list[LinearModel]:
+    """The nominal aircraft linearised at the controller's trim points."""
+    models = []
+    for wanted in settings.trim_points:
+        point = trim(folder, wanted.airspeed_mps, math.radians(wanted.flight_path_deg), settings.flap, mass)
+        linear = linearise(folder, point)
+        V, alpha = point.airspeed, point.alpha
+        state = np.zeros(12)
+        state[[0, 2, 7, 11]] = V * math.cos(alpha), V * math.sin(alpha), point.theta, point.height
+        inputs = np.array([point.elevator, point.thrust, 0.0, 0.0])
+        models.append(LinearModel(V, point.gamma, point.mass, state, inputs, linear.A, linear.B))
+    return models

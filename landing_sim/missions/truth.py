@@ -1,0 +1,123 @@
+"""The true side of one flight: the scenario's world, vehicle and sensors as concrete parts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from landing_sim import paths
+from landing_sim.geometry.earth import RunwayFrame
+from landing_sim.geometry.pinhole import Intrinsics
+from landing_sim.interfaces import Sensor
+from landing_sim.noise import Noise
+from landing_sim.plants.aircraft import InitialState, JsbsimPlant
+from landing_sim.scenario import Scenario
+from landing_sim.sensors.airdata import Airspeed, AirspeedConfig
+from landing_sim.sensors.camera import Camera, Encoders
+from landing_sim.sensors.inertial import Gyro, GyroConfig
+from landing_sim.sensors.platform import PanTilt
+from landing_sim.sensors.render import Optics
+from landing_sim.sensors.squat import SquatSwitch
+from landing_sim.vehicle import Vehicle
+from landing_sim.world.dryden import W20, Turbulence
+from landing_sim.world.runway import Greys, Runway, Taxiway
+from landing_sim.world.wind import CrosswindStep, ExponentialGust, SteadyWind, Wind, WindConfig
+
+
+def runway(scenario: Scenario) -> Runway:
+    r = scenario.runway
+    return Runway(
+        width=r.width_m,
+        length=r.length_m,
+        slope=math.atan(r.slope_percent / 100.0),
+        painted=r.markings,
+        taxiways=tuple(Taxiway(t.x_m, t.width_m, t.side, t.flare_m) for t in r.taxiways),
+        greys=Greys(sky=r.grey.sky, grass=r.grey.grass, surface=r.grey.surface, paint=r.grey.marking),
+    )
+
+
+def wind(scenario: Scenario, noise: Noise) -> Wind:
+    w = scenario.wind
+    everywhere = w.crosswind_from_x_m is None
+    turbulence = None
+    if w.turbulence is not None:
+        t = w.turbulence
+        turbulence = Turbulence((t.wind_at_20ft_mps or 0.0) if t.severity is None else W20[t.severity])
+    config = WindConfig(
+        steady=SteadyWind(w.headwind_mps, w.crosswind_mps if everywhere else 0.0),
+        step=None if w.crosswind_from_x_m is None else CrosswindStep(w.crosswind_from_x_m, w.crosswind_mps),
+        gust=None
+        if w.gust is None
+        else ExponentialGust(w.gust.at_x_m, w.gust.lateral_mps, w.gust.vertical_mps, w.gust.time_constant_s),
+        turbulence=turbulence,
+    )
+    return Wind(config, noise)
+
+
+def platform(scenario: Scenario, vehicle: Vehicle, noise: Noise) -> PanTilt:
+    """The camera mount, turned by an operator to where the runway is thought to be."""
+    p, start = scenario.camera.platform, scenario.initial
+    off = math.radians(scenario.believed.pointing_sigma_deg) * np.clip(noise.normal(2), -2.0, 2.0)
+    return PanTilt(
+        lag=p.lag_s,
+        rate_limit=math.radians(p.rate_limit_dps),
+        pan_limit=math.radians(vehicle.camera.pan_limit_deg),
+        tilt_limit=math.radians(vehicle.camera.tilt_limit_deg),
+        stabilisation=p.stabilisation,
+        pan=-math.radians(start.heading_deg) + float(off[0]),
+        tilt=-math.radians(start.flight_path_deg) + float(off[1]),
+    )
+
+
+def plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt, wind: Wind) -> JsbsimPlant:
+    a, s, r = scenario.aircraft, scenario.initial, scenario.runway
+    frame = RunwayFrame(
+        math.radians(r.latitude_deg), math.radians(r.longitude_deg), r.elevation_m, math.radians(r.heading_deg)
+    )
+    initial = InitialState(
+        x=s.x_m,
+        y=s.y_m,
+        height=s.height_m,
+        psi=math.radians(s.heading_deg),
+        airspeed=s.airspeed_mps,
+        gamma=math.radians(s.flight_path_deg),
+        flap=vehicle.control.flap if a.flap is None else a.flap,
+        mass=a.mass_kg,
+        cg_offset_B=(a.cg_offset_m, 0.0, 0.0),
+    )
+    return JsbsimPlant(
+        paths.aircraft_folder(a.model),
+        frame,
+        initial,
+        math.atan(r.slope_percent / 100.0),
+        scenario.time.step_s,
+        wind.wind(0.0, s.x_m, s.height_m, s.airspeed_mps),
+        platform,
+        np.array(vehicle.camera.p_BC_m),
+    )
+
+
+def sensors(scenario: Scenario, platform: PanTilt, noise: Callable[[str], Noise]) -> tuple[Sensor, ...]:
+    """Inertial first: what the camera's front end is told rests on them."""
+    cycle, c, p, s = scenario.time.cycle_s, scenario.camera, scenario.camera.platform, scenario.sensors
+    bias = math.radians(p.encoder_bias_deg)
+    camera = Camera(
+        Intrinsics.centred(c.width_px, c.height_px, c.focal_px),
+        runway(scenario),
+        platform,
+        noise("pixels"),
+        noise("encoder"),
+        Optics(c.blur_px, c.noise_dn, c.gain, 0.0, c.exposure_s, c.renderer),
+        Encoders(bias, bias, math.radians(p.encoder_noise_deg), p.encoder_skew_s),
+        c.period_s,
+        c.latency_s,
+    )
+    gyro = GyroConfig(cycle, math.radians(s.gyro.noise_dps), math.radians(s.gyro.bias_dps))
+    return (
+        Gyro(gyro, noise("gyro")),
+        Airspeed(AirspeedConfig(cycle, s.airspeed.noise_mps), noise("airspeed")),
+        SquatSwitch(cycle),
+        camera,
+    )
