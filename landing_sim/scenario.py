@@ -160,11 +160,34 @@ class Airspeed(Section):
     noise_mps: float = Field(0.5, ge=0, le=20, description="1 sigma of a sample")
 
 
+class InertialUnit(Section):
+    """Inertial reference unit: attitude, rates and velocity over the ground. Biases are drawn per run."""
+
+    attitude_bias_deg: float = Field(0.05, ge=0, le=5, description="1 sigma of the constant error of roll and of pitch")
+    heading_bias_deg: float = Field(0.3, ge=0, le=10, description="1 sigma of the constant error of true heading")
+    velocity_bias_sigma_mps: float = Field(0.1, ge=0, le=10, description="1 sigma of the constant error of each axis")
+    velocity_bias_mps: tuple[float, float, float] | None = Field(
+        None, description="this error instead of a drawn one: along the runway, right, down"
+    )
+    attitude_noise_deg: float = Field(0.01, ge=0, le=5, description="1 sigma of a sample")
+    rate_noise_dps: float = Field(0.02, ge=0, le=5, description="1 sigma of a sample")
+    velocity_noise_mps: float = Field(0.02, ge=0, le=5, description="1 sigma of a sample")
+
+
+class FlowAngles(Section):
+    """Vanes for angle of attack and sideslip."""
+
+    noise_deg: float = Field(0.2, ge=0, le=10, description="1 sigma of a sample")
+    bias_deg: float = Field(0.1, ge=0, le=10, description="1 sigma of the constant bias of a vane, drawn per run")
+
+
 class Sensors(Section):
     """Sensors other than the camera."""
 
     gyro: Gyro = Field(Gyro(), description="rate gyros")
     airspeed: Airspeed = Field(Airspeed(), description="airspeed")
+    inertial: InertialUnit = Field(InertialUnit(), description="inertial reference unit, used by filter.kind observer")
+    flow_angles: FlowAngles = Field(FlowAngles(), description="vanes, used by filter.kind observer")
 
 
 class Vision(Section):
@@ -184,8 +207,10 @@ class Vision(Section):
 class Filter(Section):
     """The estimator."""
 
-    kind: Literal["augmented", "plain", "split"] = Field(
-        "augmented", description="12 states with wind and gyro bias; the paper's 12; the paper's two halves of 6"
+    kind: Literal["augmented", "plain", "split", "observer"] = Field(
+        "augmented",
+        description="12 states with wind and gyro bias; the paper's 12; the paper's two halves of 6; or a range observer "
+        "on an unknown runway (section observer)",
     )
     factorisation: Literal["dense", "ud"] = Field(
         "dense", description="full covariance, or Bierman's sequential U-D update"
@@ -200,6 +225,25 @@ class Filter(Section):
     compensate_latency: bool = Field(True, description="apply an image at the time it was exposed")
     gate_sigma: Annotated[float, Field(gt=0, le=100)] | Literal["auto"] | None = Field(
         "auto", description="reject a window beyond this; null = no gate; auto = 4 if wind is estimated, else no gate"
+    )
+
+
+class Observer(Section):
+    """The runway's size is not known: its change with the aircraft's own motion tells the range (filter.kind observer)."""
+
+    ranging: Literal["gibert", "ekf"] = Field("gibert", description="high-gain observer, or extended Kalman filter")
+    outputs: Literal["both", "width", "point"] = Field(
+        "both",
+        description="what gibert ranges with: the runway's angular width, the threshold's bearing (unobservable on the "
+        "glide path), or both",
+    )
+    first_range_m: Positive | None = Field(
+        None, description="first guess of the range to the threshold; null = what a runway 45 m wide would be at"
+    )
+    bandwidth_rps: float = Field(0.5, gt=0, le=5, description="of the range, gibert")
+    attitude: Literal["inertial", "horizon"] = Field("inertial", description="where roll and pitch come from")
+    trust_percent: float = Field(
+        10.0, gt=0, le=100, description="the range steers nothing before its error bound has come below this"
     )
 
 
@@ -301,6 +345,7 @@ class Scenario(Section):
     sensors: Sensors = Field(Sensors(), description="other sensors")
     vision: Vision = Field(Vision(), description="front end")
     filter: Filter = Field(Filter(), description="estimator")
+    observer: Observer = Field(Observer(), description="range observer, where filter.kind says so")
     believed: Believed = Field(Believed(), description="onboard models against the truth")
     control: Control = Field(Control(), description="controller")
     record: Record = Field(Record(), description="outputs")

@@ -111,7 +111,8 @@ class Sample:
     sensor: str
     t_valid: float
     t_arrival: float
-    data: Any  # gyro: (3,) [rad/s]; airspeed: float [m/s]; camera: CameraSample; faulted sensors send nothing
+    # gyro: (3,) [rad/s]; airspeed: float [m/s]; flow_angles: (2,) [rad]; inertial: InertialReading; camera: CameraSample
+    data: Any  # a faulted sensor sends nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +125,16 @@ class CameraSample:
     tilt: float
     pan_cmd: float  # [rad] the angles asked for (all that a system without encoders would know)
     tilt_cmd: float
+
+
+@dataclass(frozen=True, slots=True)
+class InertialReading:
+    """What an inertial reference unit says, against the local level and true north at the aircraft (N: north, east, down)."""
+
+    euler: Array  # (3,) [rad] phi, theta, psi of the body; psi from true north
+    rates: Array  # (3,) [rad/s] p, q, r
+    v_N: Array  # (3,) [m/s] velocity over the ground
+    moved_N: Array  # (3,) [m] way of the cg since the reading before: the exact integral of a velocity with this bias
 
 
 # --------------------------------------------------------------------------------------------- onboard side
@@ -173,6 +184,7 @@ class Measurement:
     kinds      "edges": z (n,) px, R (n,) variances, geometry an EdgeSet
                "pose": z (6,) x, y, H of the cg, phi, theta, psi of the body; R (6, 6): acquisition
                "gyro": z (3,) rad/s, R (3,); "airspeed": z (1,) m/s, R (1,); "on_ground": z (1,) 0 or 1
+               "inertial": z (12,) euler, rates, v_N, moved_N of an InertialReading; "flow_angles": z (2,) alpha, beta
     """
 
     kind: str

@@ -22,9 +22,12 @@ class Size(Section):
 
 
 class CameraMount(Section):
-    """Where the camera platform sits and how far it turns."""
+    """Where the camera sits, and the platform that turns it; or none, where it is strapped down."""
 
     p_BC_m: tuple[float, float, float] = Field(description="camera from the nominal cg: forward, right, down")
+    fixed_tilt_deg: float | None = Field(
+        None, ge=-60, le=60, description="strapped down, looking up (+) by this from body x; null = on a platform"
+    )
     pan_limit_deg: float = Field(60.0, gt=0, le=180, description="either way")
     tilt_limit_deg: float = Field(45.0, gt=0, le=80, description="either way")
 

@@ -76,6 +76,8 @@ def front_ends(scenario: Scenario, camera: BelievedCamera) -> dict[str, FrontEnd
 
 def estimator(scenario: Scenario, vehicle: Vehicle, camera: BelievedCamera, noise: Noise) -> Estimator:
     f, b = scenario.filter, scenario.believed
+    if f.kind == "observer":
+        raise NotImplementedError
     config = FilterConfig(
         kind=f.kind,
         factorisation=f.factorisation,

@@ -14,10 +14,11 @@ from landing_sim.interfaces import Sensor
 from landing_sim.noise import Noise
 from landing_sim.plants.aircraft import InitialState, JsbsimPlant
 from landing_sim.scenario import Scenario
-from landing_sim.sensors.airdata import Airspeed, AirspeedConfig
+from landing_sim.sensors.airdata import Airspeed, AirspeedConfig, FlowAngles, FlowAnglesConfig
 from landing_sim.sensors.camera import Camera, Encoders
 from landing_sim.sensors.inertial import Gyro, GyroConfig
-from landing_sim.sensors.platform import PanTilt
+from landing_sim.sensors.inertial_reference import InertialReference, InertialReferenceConfig
+from landing_sim.sensors.platform import PanTilt, Strapdown
 from landing_sim.sensors.render import Optics
 from landing_sim.sensors.squat import SquatSwitch
 from landing_sim.vehicle import Vehicle
@@ -56,8 +57,10 @@ def wind(scenario: Scenario, noise: Noise) -> Wind:
     return Wind(config, noise)
 
 
-def platform(scenario: Scenario, vehicle: Vehicle, noise: Noise) -> PanTilt:
-    """The camera mount, turned by an operator to where the runway is thought to be."""
+def platform(scenario: Scenario, vehicle: Vehicle, noise: Noise) -> PanTilt | Strapdown:
+    """The camera mount: bolted down, or turned by an operator to where the runway is thought to be."""
+    if vehicle.camera.fixed_tilt_deg is not None:
+        return Strapdown(math.radians(vehicle.camera.fixed_tilt_deg))
     p, start = scenario.camera.platform, scenario.initial
     off = math.radians(scenario.believed.pointing_sigma_deg) * np.clip(noise.normal(2), -2.0, 2.0)
     return PanTilt(
@@ -71,7 +74,7 @@ def platform(scenario: Scenario, vehicle: Vehicle, noise: Noise) -> PanTilt:
     )
 
 
-def plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt, wind: Wind) -> JsbsimPlant:
+def plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt | Strapdown, wind: Wind) -> JsbsimPlant:
     a, s, r = scenario.aircraft, scenario.initial, scenario.runway
     frame = RunwayFrame(
         math.radians(r.latitude_deg), math.radians(r.longitude_deg), r.elevation_m, math.radians(r.heading_deg)
@@ -99,7 +102,7 @@ def plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt, wind: Wind) -
     )
 
 
-def sensors(scenario: Scenario, platform: PanTilt, noise: Callable[[str], Noise]) -> tuple[Sensor, ...]:
+def sensors(scenario: Scenario, platform: PanTilt | Strapdown, noise: Callable[[str], Noise]) -> tuple[Sensor, ...]:
     """Inertial first: what the camera's front end is told rests on them."""
     cycle, c, p, s = scenario.time.cycle_s, scenario.camera, scenario.camera.platform, scenario.sensors
     bias = math.radians(p.encoder_bias_deg)
@@ -114,10 +117,28 @@ def sensors(scenario: Scenario, platform: PanTilt, noise: Callable[[str], Noise]
         c.period_s,
         c.latency_s,
     )
+    unit, vanes = s.inertial, s.flow_angles
+    reference = InertialReference(
+        InertialReferenceConfig(
+            cycle,
+            math.radians(unit.attitude_bias_deg),
+            math.radians(unit.heading_bias_deg),
+            unit.velocity_bias_sigma_mps,
+            None if unit.velocity_bias_mps is None else unit.velocity_bias_mps,
+            math.radians(unit.attitude_noise_deg),
+            math.radians(unit.rate_noise_dps),
+            unit.velocity_noise_mps,
+        ),
+        math.radians(scenario.runway.heading_deg),
+        noise("inertial"),
+    )
+    flow = FlowAnglesConfig(cycle, math.radians(vanes.noise_deg), math.radians(vanes.bias_deg))
+    air = () if scenario.filter.kind != "observer" else (reference, FlowAngles(flow, noise("flow_angles")))
     gyro = GyroConfig(cycle, math.radians(s.gyro.noise_dps), math.radians(s.gyro.bias_dps))
     return (
         Gyro(gyro, noise("gyro")),
         Airspeed(AirspeedConfig(cycle, s.airspeed.noise_mps), noise("airspeed")),
+        *air,
         SquatSwitch(cycle),
         camera,
     )

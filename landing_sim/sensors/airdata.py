@@ -1,9 +1,11 @@
-"""Air data: the true airspeed that a pitot-static system and its computer report."""
+"""Air data: the true airspeed that a pitot-static system and its computer report, and the vanes for its direction."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+
+import numpy as np
 
 from landing_sim.noise import NoiseStream
 from landing_sim.sensors.instrument import check_settings, draw_bias
@@ -62,3 +64,35 @@ class Airspeed:
             self._lagged = speed - behind + held * (self._lagged - self._input + behind)
         self._t, self._input = t, speed
         return self._lagged
+
+
+@dataclass(frozen=True, slots=True)
+class FlowAnglesConfig:
+    """Two vanes; rad and s."""
+
+    period: float = 0.06
+    noise: float = math.radians(0.2)  # 1 sigma of white noise, per sample and vane
+    bias_sigma: float = math.radians(0.1)  # constant over a run
+    latency: float = 0.0
+    name: str = "flow_angles"
+
+    def __post_init__(self) -> None:
+        check_settings(self.name, self.period, self.latency, noise=self.noise, bias_sigma=self.bias_sigma)
+
+
+class FlowAngles:
+    """interfaces.Sensor: angle of attack and sideslip + bias + white noise, (2,) [rad]. `bias` (2,) is this run's."""
+
+    channels = 2
+
+    def __init__(self, config: FlowAnglesConfig, noise: NoiseStream) -> None:
+        self.name = config.name
+        self.period = config.period
+        self.bias = draw_bias(config.name, None, config.bias_sigma, 2, noise)
+        self._config = config
+        self._noise = noise
+
+    def sense(self, truth: Truth, camera: CameraTruth) -> Sample | None:
+        config = self._config
+        angles = np.array([truth.alpha, truth.beta]) + self.bias + config.noise * self._noise.normal(2)
+        return Sample(self.name, truth.t, truth.t + config.latency, angles)

@@ -1,4 +1,4 @@
-"""The two-axis camera platform: an actuated mount bolted to the airframe, part of the plant."""
+"""What carries the camera, part of the plant: a two-axis platform, or the airframe itself."""
 
 from __future__ import annotations
 
@@ -86,6 +86,24 @@ class PanTilt:
             self.pan, self.tilt, pan_cmd, tilt_cmd, w_RB_B, dt,
             self._lag, self._rate_limit, self._stabilisation, self.pan_limit, self.tilt_limit,
         )  # fmt: skip
+
+
+class Strapdown:
+    """A camera bolted to the airframe: looks along body x, raised by `tilt` [rad], whatever is commanded."""
+
+    __slots__ = ("pan", "pan_cmd", "pan_rate", "tilt", "tilt_cmd", "tilt_rate")
+
+    def __init__(self, tilt: float) -> None:
+        if not abs(tilt) <= math.radians(80.0):
+            raise ValueError(f"a strapped-down camera looks up or down by at most 80 deg, not {math.degrees(tilt):g}")
+        self.pan = self.pan_cmd = self.pan_rate = self.tilt_rate = 0.0
+        self.tilt = self.tilt_cmd = tilt
+
+    def reset(self, pan: float, tilt: float) -> None:
+        """Nothing moves."""
+
+    def step(self, pan_cmd: float, tilt_cmd: float, w_RB_B: Array, dt: float) -> None:
+        """Nothing moves."""
 
 
 @kernel
