@@ -10,7 +10,11 @@ import numpy as np
 
 from landing_sim.control.design import Design, LinearModel, design
 from landing_sim.control.settings import ControlSettings
-from landing_sim.estimators.readings import Reading
+from landing_sim.estimators.observer.gibert import Gibert, GibertConfig
+from landing_sim.estimators.observer.kinematic_ekf import EkfConfig, KinematicEkf
+from landing_sim.estimators.observer.looking import Ranging
+from landing_sim.estimators.observer.runway_observer import ObserverConfig, RunwayObserver
+from landing_sim.estimators.readings import InertialFrontEnd, Reading
 from landing_sim.estimators.rewind import Rewind
 from landing_sim.estimators.runway_ekf import RunwayEkf
 from landing_sim.estimators.runway_filter import FilterConfig
@@ -27,6 +31,8 @@ from landing_sim.vision.front_end import FrontEndConfig, RunwayFrontEnd
 from landing_sim.vision.windows import EdgeConfig
 from landing_sim.world.markings import stripe_count
 
+NOMINAL_WIDTH = 45.0  # [m] what an unknown runway is drawn with until its own motion tells
+
 
 def believed_camera(scenario: Scenario, vehicle: Vehicle) -> BelievedCamera:
     c = scenario.camera
@@ -41,6 +47,8 @@ def believed_camera(scenario: Scenario, vehicle: Vehicle) -> BelievedCamera:
 
 
 def _believed_width(scenario: Scenario) -> float:
+    if scenario.filter.kind == "observer":
+        return NOMINAL_WIDTH
     believed = scenario.filter.believed_width_m
     return scenario.runway.width_m if believed is None else believed
 
@@ -71,13 +79,15 @@ def front_ends(scenario: Scenario, camera: BelievedCamera) -> dict[str, FrontEnd
         "gyro": Reading("gyro", "gyro", math.radians(max(s.gyro.noise_dps, 0.01))),
         "airspeed": Reading("airspeed", "airspeed", _airspeed_sigma(scenario)),
         "squat": Reading("squat", "on_ground", 0.0),
+        "inertial": InertialFrontEnd(),
+        "flow_angles": Reading("flow_angles", "flow_angles", math.radians(s.flow_angles.noise_deg)),
     }
 
 
 def estimator(scenario: Scenario, vehicle: Vehicle, camera: BelievedCamera, noise: Noise) -> Estimator:
     f, b = scenario.filter, scenario.believed
     if f.kind == "observer":
-        raise NotImplementedError
+        return _late(scenario, range_observer(scenario, camera))
     config = FilterConfig(
         kind=f.kind,
         factorisation=f.factorisation,
@@ -98,10 +108,27 @@ def estimator(scenario: Scenario, vehicle: Vehicle, camera: BelievedCamera, nois
         _believed_width(scenario),
         math.atan(scenario.runway.slope_percent / 100.0),
     )
+    return _late(scenario, ekf)
+
+
+def range_observer(scenario: Scenario, camera: BelievedCamera) -> RunwayObserver:
+    """The estimator for a runway that is not known."""
+    o, lever = scenario.observer, np.array(camera.p_BC)
+    ranging: Ranging
+    if o.ranging == "gibert":
+        config = GibertConfig(outputs=o.outputs, attitude=o.attitude, bandwidth=o.bandwidth_rps)
+        ranging = Gibert(config, camera.intrinsics, lever)
+    else:
+        ranging = KinematicEkf(EkfConfig(), camera.intrinsics, lever)
+    return RunwayObserver(ObserverConfig(o.first_range_m, o.trust_percent / 100.0), ranging, NOMINAL_WIDTH, lever)
+
+
+def _late(scenario: Scenario, estimator: Estimator) -> Estimator:
+    """Images that are old when they arrive are applied when they were taken."""
     latency = scenario.camera.latency_s
-    if latency > 0.0 and f.compensate_latency:
-        return Rewind(ekf, latency + 2.0 * scenario.time.cycle_s)
-    return ekf
+    if latency > 0.0 and scenario.filter.compensate_latency:
+        return Rewind(estimator, latency + 2.0 * scenario.time.cycle_s)
+    return estimator
 
 
 def _airspeed_sigma(scenario: Scenario) -> float:
@@ -139,10 +166,19 @@ def planned_design(folder: Path, settings: ControlSettings, mass: float) -> Desi
 
 
 def linear_models(folder: Path, settings: ControlSettings, mass: float) -> list[LinearModel]:
-    """The nominal aircraft linearised at the controller's trim points."""
+    """The nominal aircraft linearised at the controller's trim points; a stabiliser stays where the first one has it."""
     models = []
+    stabiliser: float | None = None
     for wanted in settings.trim_points:
-        point = trim(folder, wanted.airspeed_mps, math.radians(wanted.flight_path_deg), settings.flap, mass)
+        point = trim(
+            folder,
+            wanted.airspeed_mps,
+            math.radians(wanted.flight_path_deg),
+            settings.flap,
+            mass,
+            stabiliser=stabiliser,
+        )
+        stabiliser = point.stabiliser
         linear = linearise(folder, point)
         V, alpha = point.airspeed, point.alpha
         state = np.zeros(12)

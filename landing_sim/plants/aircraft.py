@@ -174,7 +174,8 @@ class JsbsimPlant:
         tail = weight * reach[0] / (reach[0] - reach[2])
         load = np.array([0.5 * (weight - tail), 0.5 * (weight - tail), tail])
         drop = c.p_B[:3, 2] - load / stiffness  # of the tyres below the cg, compressed, nose level
-        theta = math.atan2(drop[0] - drop[2], c.p_B[0, 0] - c.p_B[2, 0])
+        forward = math.copysign(1.0, c.p_B[0, 0] - c.p_B[2, 0])  # the third wheel may be a nose wheel
+        theta = math.atan2(forward * (drop[0] - drop[2]), forward * (c.p_B[0, 0] - c.p_B[2, 0]))
         over = c.p_B[0, 2] * math.cos(theta) - c.p_B[0, 0] * math.sin(theta) - load[0] / stiffness[0]
         height = (over + s.x * math.sin(self._slope)) / math.cos(self._slope)
         point = TrimPoint(0.0, 0.0, s.flap, self._model.mass, height, 0.0, theta, 0.0, 0.0, 0.0, 0.0)

@@ -83,6 +83,9 @@ class FlightModel:
             raise PlantError(f"the flight model has no property {path!r}")
         return node
 
+    def has(self, path: str) -> bool:
+        return bool(self._properties.hasNode(path))
+
     def get(self, path: str) -> float:
         return float(self.node(path).get_double_value())
 
@@ -126,6 +129,9 @@ class FlightModel:
         self.set("atmosphere/turb-type", 0.0)
         self.node("propulsion/fuel_freeze").set_double_value(1.0)  # write-only
         self.n_engines = n_engines
+        self.stabiliser_limits: tuple[float, float] | None = None  # [rad] elevator-equivalent, if there is one
+        if self.has("fcs/stabiliser-cmd-rad"):
+            self.stabiliser_limits = (self.get("fcs/stabiliser-min-rad"), self.get("fcs/stabiliser-max-rad"))
 
     def _lift_contacts(self) -> None:
         for i in range(self._fdm.get_ground_reactions().get_num_gear_units()):
@@ -197,6 +203,10 @@ class FlightModel:
             self.set_controls_norm, (elevator / e, aileron / a, rudder / r, flap, *(throttle,) * self.n_engines)
         ):
             write(value)
+
+    def stabilise(self, angle: float) -> None:
+        """Set the stabiliser [rad], as the elevator angle worth as much. Raises PlantError where there is none."""
+        self.set("fcs/stabiliser-cmd-rad", angle)
 
     def release(self, wind_N: Sequence[float]) -> None:
         """End the placing: from now on actuators and engines have memory, and the air moves with wind_N (3,) [m/s]."""

@@ -38,6 +38,7 @@ class TrimPoint:
     throttle: float  # 0..1, each engine
     thrust: float  # [N] total
     max_thrust: float  # [N] total at this airspeed
+    stabiliser: float | None = None  # [rad] as the elevator angle worth as much; None where there is none
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,19 +59,28 @@ class LinearModel:
 def trim(
     folder: Path, airspeed: float, gamma: float, flap: float, mass: float | None = None, height: float = 50.0,
     cg_offset_B: Array | None = None, clearance: float = math.inf, place: tuple[float, float] = PLACE,
-    model: FlightModel | None = None,
+    model: FlightModel | None = None, stabiliser: float | None = None,
 ) -> TrimPoint:  # fmt: skip
     """Find alpha, elevator and throttle for steady flight `height` [m] above sea level, `clearance` [m] above ground.
 
-    Infinitely far from it there is no ground effect. `model` saves loading one. Raises PlantError, with what was
-    reached, where there is no such flight.
+    Infinitely far from it there is no ground effect. `model` saves loading one. An aircraft with a stabiliser is trimmed
+    by it and its elevator centred, unless the stabiliser [rad] is given: it is slow, so flight near an earlier trim is on
+    the elevator. Raises PlantError, with what was reached, where there is no such flight.
     """
     m = FlightModel(folder, 0.005, mass, cg_offset_B) if model is None else model
+    if stabiliser is not None:
+        m.stabilise(stabiliser)
+    by_stabiliser = m.stabiliser_limits is not None and stabiliser is None
+    name, (low, high) = "elevator", (-m.ranges[0], m.ranges[0])
+    if by_stabiliser and m.stabiliser_limits is not None:
+        name, (low, high) = "stabiliser", m.stabiliser_limits
 
     def residual(z: Array) -> Array:
-        """du, dw [m/s^2], dq [rad/s^2] for alpha, elevator, throttle."""
+        """du, dw [m/s^2], dq [rad/s^2] for alpha, elevator or stabiliser, throttle."""
         alpha = float(z[0])
-        m.controls(float(z[1]), 0.0, 0.0, float(z[2]), flap)
+        if by_stabiliser:
+            m.stabilise(float(z[1]))
+        m.controls(0.0 if by_stabiliser else float(z[1]), 0.0, 0.0, float(z[2]), flap)
         m.set_terrain_ft(max(NO_GROUND, (height - clearance) / FT))
         uvw = airspeed * np.array([math.cos(alpha), 0.0, math.sin(alpha)])
         m.place((*place, height), np.array([0.0, alpha + gamma, 0.0]), uvw)
@@ -87,19 +97,22 @@ def trim(
         except np.linalg.LinAlgError:
             break
         z[2] = min(max(z[2], 0.0), 1.0)
+        if by_stabiliser:
+            z[1] = min(max(z[1], low), high)
     f = residual(z)
     thrust = m.accelerations()[1]
-    if not np.max(np.abs(f)) < 1e-6 or abs(z[1]) > m.ranges[0]:
+    if not np.max(np.abs(f)) < 1e-6 or not low <= z[1] <= high:
         raise PlantError(
             f"no trim at {airspeed:g} m/s, gamma {math.degrees(gamma):g} deg, flap {flap:g}: reached alpha "
-            f"{math.degrees(z[0]):.1f} deg, elevator {z[1]:.3f} of {m.ranges[0]:g} rad, throttle {z[2]:.2f} with "
+            f"{math.degrees(z[0]):.1f} deg, {name} {z[1]:.3f} of {low:g} ... {high:g} rad, throttle {z[2]:.2f} with "
             f"accelerations {f[0]:.2g}, {f[1]:.2g} m/s^2, {f[2]:.2g} rad/s^2"
         )
     residual(np.array([z[0], z[1], 1.0]))
     full = m.accelerations()[1]
     return TrimPoint(
         airspeed=airspeed, gamma=gamma, flap=flap, mass=m.mass, height=height, alpha=float(z[0]),
-        theta=float(z[0]) + gamma, elevator=float(z[1]), throttle=float(z[2]), thrust=thrust, max_thrust=full,
+        theta=float(z[0]) + gamma, elevator=0.0 if by_stabiliser else float(z[1]), throttle=float(z[2]), thrust=thrust,
+        max_thrust=full, stabiliser=float(z[1]) if by_stabiliser else stabiliser,
     )  # fmt: skip
 
 
@@ -107,12 +120,14 @@ def linearise(folder: Path, point: TrimPoint, model: FlightModel | None = None) 
     """A, B, G about `point`, by central differences of the flight model's accelerations.
 
     Thrust [N] is the input and held: its fall with speed is not in A (subtract B_thrust dT/du to add it back).
-    The tail feels downwash tau = 0.145 s late, eps(t - tau) ~ eps - tau deps/dt; with dalpha/dt from dw/dt and du/dt this
+    Where the flight model has a delayed downwash, the tail feels it tau late: eps(t - tau) ~ eps - tau deps/dt; with dalpha/dt from dw/dt and du/dt this
     is x' = A0 x + D c x', so A = (I - D c)^-1 A0, the same for B and G. Wind enters forces only, as -A0[:6, u v w], and
     dalpha/dt by its own rate: G_dot = -(I - D c)^-1 D c[u v w].
     Position and heading do not act on the forces, but height does (density).
     """
     m = FlightModel(folder, 0.005, point.mass) if model is None else model
+    if point.stabiliser is not None:
+        m.stabilise(point.stabiliser)
     V, alpha, theta = point.airspeed, point.alpha, point.theta
     x0 = np.array([V * math.cos(alpha), 0.0, V * math.sin(alpha), 0.0, 0.0, 0.0, 0.0, theta, point.height])
     u0 = np.array([point.elevator, point.throttle, 0.0, 0.0])
@@ -144,6 +159,9 @@ def linearise(folder: Path, point: TrimPoint, model: FlightModel | None = None) 
     _kinematics(A, x0)
     G = np.zeros((12, 3))
     G[:6] = -A[:6, :3]
+
+    if not m.has("aero/downwash-now-rad"):
+        return LinearModel(A, B, G, np.zeros((12, 3)), STATES, INPUTS)
 
     # (I - D c) x' = A0 x + B0 u + G0 w
     path, h = "aero/downwash-shift-rad", 1e-3
