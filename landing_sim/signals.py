@@ -129,7 +129,7 @@ class CameraSample:
 
 @dataclass(frozen=True, slots=True)
 class InertialReading:
-    """What an inertial reference unit says, against the local level and true north at the aircraft (N: north, east, down)."""
+    """What an inertial reference unit says, against local level and true north at the aircraft (N: north, east, down)."""
 
     euler: Array  # (3,) [rad] phi, theta, psi of the body; psi from true north
     rates: Array  # (3,) [rad/s] p, q, r

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from landing_sim.signals import Estimate, Measurement, Sample
+from landing_sim.signals import Estimate, InertialReading, Measurement, Sample
 
 
 class Reading:
@@ -18,3 +18,14 @@ class Reading:
     def process(self, sample: Sample, estimate: Estimate) -> tuple[Measurement, ...]:
         z = np.atleast_1d(np.asarray(sample.data, dtype=float))
         return (Measurement(self.kind, sample.t_valid, sample.t_arrival, z, np.full(z.shape, self.variance)),)
+
+
+class InertialFrontEnd:
+    """An inertial unit's readings as measurements "inertial" (interfaces.FrontEnd)."""
+
+    sensor = "inertial"
+
+    def process(self, sample: Sample, estimate: Estimate) -> tuple[Measurement, ...]:
+        r: InertialReading = sample.data
+        z = np.concatenate([r.euler, r.rates, r.v_N, r.moved_N])
+        return (Measurement("inertial", sample.t_valid, sample.t_arrival, z, np.zeros(12)),)

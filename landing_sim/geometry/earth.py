@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from landing_sim.geometry.so3 import from_euler
 from landing_sim.types import Array
 
 A = 6378137.0  # [m] semi-major axis, WGS84
@@ -100,3 +101,8 @@ class RunwayFrame:
     def R_RN(self, latitude: float, longitude: float) -> Array:
         """(3, 3) from the local north-east-down frame at that position into R."""
         return self.R_RE @ ned_from_ecef(latitude, longitude).T
+
+
+def level_at(p_R: Array) -> Array:
+    """R_LR (3, 3): the runway's axes, levelled where p_R (3,) [m] is, on a sphere: 0.045 degrees at 5 km."""
+    return from_euler(-p_R[1] / A, p_R[0] / A, 0.0)

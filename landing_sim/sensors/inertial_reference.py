@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from landing_sim.geometry.earth import A as EARTH_RADIUS
-from landing_sim.geometry.so3 import from_euler, to_euler
+from landing_sim.geometry.earth import level_at
+from landing_sim.geometry.so3 import to_euler
 from landing_sim.noise import NoiseStream
 from landing_sim.sensors.instrument import check_settings, draw_bias
 from landing_sim.signals import CameraTruth, InertialReading, Sample, Truth
-from landing_sim.types import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +79,3 @@ class InertialReference:
             moved = R_NR @ (truth.p_RB - self._p_R) + bias * (truth.t - self._t)
         self._t, self._p_R = truth.t, truth.p_RB
         return Sample(self.name, truth.t, truth.t + config.latency, InertialReading(euler, rates, v_N, moved))
-
-
-def level_at(p_R: Array) -> Array:
-    """R_LR (3, 3): the runway's axes, levelled where p_R (3,) [m] is, on a sphere."""
-    return from_euler(-p_R[1] / EARTH_RADIUS, p_R[0] / EARTH_RADIUS, 0.0)

@@ -1,0 +1,190 @@
+"""The range observer on an unknown runway: high gain, along the ray, with outputs that fade instead of dividing by zero.
+
+With rho = 1 / X of the threshold ahead of the camera and the outputs y1, y2 (bearings) and s = W / X (angular width),
+
+    y_i' = d_i rho,    d1 = v1 y1 - v2,    d2 = v1 y2 - v3,    d_s = v1 s           (v: the camera's velocity in R)
+    y_i += l1 e_i,     rho += l2 sum(w_i d_i e_i) / (sum(w_i d_i^2) + eps^2)         (w_i: inverse variances, normalised)
+
+On the glide path the aim point's d1 = d2 = 0: no observer can range it. The runway's width keeps d_s = v1 s > 0.
+Where all d are small against eps the range is carried by the inertial velocity alone.
+
+Source     Gibert et al. 2015, eqs. (7)-(13). Departs: its inverse of dPsi/dx (a division by d1) is replaced by the
+           smooth form; the third output and its unknown width are ours; discrete gains that are exact for a held
+           measurement. When the threshold has left the image, height and offset follow from the borders and the width
+           found so far.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from landing_sim.estimators.observer import scene as sc
+from landing_sim.estimators.observer.bearings import Bearings, bearings
+from landing_sim.estimators.observer.looking import Image
+from landing_sim.estimators.observer.scene import Carriage, Scene
+from landing_sim.estimators.ranging.fused import correct, faded
+from landing_sim.estimators.ranging.gains import pole_pair
+from landing_sim.geometry.pinhole import Intrinsics
+from landing_sim.types import Array
+
+RAD = math.pi / 180.0
+
+
+@dataclass(frozen=True, slots=True)
+class GibertConfig:
+    """bandwidth [rad/s] of the range; bearing_rate [1/s] of the bearings; eps [m/s] of angular motion below which the
+    range is carried; velocity_sigma [m/s] believed of the inertial unit; first_spread: relative, of the first guess."""
+
+    outputs: Literal["both", "width", "point"] = "both"
+    attitude: Literal["inertial", "horizon"] = "inertial"
+    bandwidth: float = 0.5
+    bearing_rate: float = 2.0
+    eps: float = 0.1
+    floor: float = 4.0  # [m/s] of bearings: what moves slower than this is drowned in the velocity's error over d
+    limit: float = 0.02  # largest share of the range that one image may correct
+    velocity_sigma: float = 0.3
+    bearing_floor: float = 2e-4  # [rad] common to all windows of an image: attitude
+    first_spread: float = 0.6
+    course_drift: float = 0.01 * RAD  # [rad / sqrt(s)]
+    tilt_drift: float = 0.003 * RAD
+    least_range: float = 30.0  # [m] an estimate that runs through zero steers into the ground
+
+
+class Gibert:
+    """looking.Ranging with constant gains."""
+
+    def __init__(self, config: GibertConfig, lens: Intrinsics, lever: Array) -> None:
+        self.config, self._lens, self._lever = config, lens, np.asarray(lever, dtype=float)
+        self._use = np.array(
+            {"both": (1.0, 1.0, 1.0), "width": (0.0, 0.0, 1.0), "point": (1.0, 1.0, 0.0)}[config.outputs]
+        )
+        self._floors = np.array([config.floor, config.floor, 0.0])
+        self._common = np.array([config.bearing_floor**2, config.bearing_floor**2, 0.0])
+
+    def start(self, s: Array, P: Array, t: float) -> Scene:
+        return Scene(s, P, self.config.first_spread, t)
+
+    def move(self, scene: Scene, way_R: Array, dt: float) -> Scene:
+        s = sc.moved(scene.s, way_R, dt)
+        P = scene.P.copy()
+        P[sc.COURSE, sc.COURSE] += self.config.course_drift**2 * dt
+        P[sc.ETILT, sc.ETILT] += self.config.tilt_drift**2 * dt
+        spread = scene.spread
+        if scene.threshold_in_view:  # carried: the error stays in metres while the range shrinks
+            before, now = abs(scene.s[sc.X]), max(abs(s[sc.X]), self.config.least_range)
+            spread = spread * before / now + self.config.velocity_sigma * dt / now
+        return replace(scene, s=s, P=P, spread=spread)
+
+    def look(self, scene: Scene, image: Image, carried: Carriage) -> Scene:
+        c, m = self.config, image.edges
+        lever_R = carried.R_RB @ self._lever
+        s = scene.s
+        if m.geometry is None:
+            raise ValueError("a measurement of kind 'edges' needs its EdgeSet")
+        camera = np.array([-s[sc.X] - lever_R[0], -s[sc.Y] - lever_R[1], s[sc.H] - lever_R[2]])  # to the threshold, R
+        seen = bearings(
+            m.z, m.R, m.geometry, self._lens, carried.R_RB, (s[sc.EPAN], s[sc.ETILT]), float(camera[2]), c.attitude
+        )
+        if seen.turned is None and seen.borders is None and seen.threshold is None:
+            return replace(scene, misses=scene.misses + 1, threshold_in_view=False)
+        s, P = s.copy(), scene.P.copy()
+        turn = self._course(s, P, seen)
+        camera[:2] = _turned(camera[:2], turn)
+        dt = min(max(image.t - scene.t_image, 1e-3), 0.5)
+        d, spread = (0.0, 0.0, 0.0), scene.spread
+        in_view = seen.threshold is not None and camera[0] > 0.0
+        if seen.threshold is not None and camera[0] > 0.0:
+            y, var = seen.threshold
+            camera, s[sc.WIDTH], d, spread = self._range(
+                camera, s[sc.WIDTH], _bearings_turned(y, turn), var, carried.v_R, spread, dt
+            )
+        elif seen.borders is not None:
+            camera = self._borders(camera, s[sc.WIDTH], *seen.borders, dt)
+        s[sc.X], s[sc.Y], s[sc.H] = -camera[0] - lever_R[0], -camera[1] - lever_R[1], camera[2] + lever_R[2]
+        self._cover(s, P, spread)
+        return replace(
+            scene,
+            s=s,
+            P=P,
+            spread=spread,
+            t_image=image.t,
+            d=d,
+            misses=0,
+            threshold_in_view=in_view,
+            frames=scene.frames + 1,
+        )
+
+    def _course(self, s: Array, P: Array, seen: Bearings) -> float:
+        """The course and the tilt error follow the vanishing point; returns by how much the axes have turned [rad]."""
+        if seen.turned is None:
+            return 0.0
+        heading, variance, rise = seen.turned
+        variance += self.config.bearing_floor**2
+        turns = []
+        for i, error in ((sc.COURSE, heading), (sc.ETILT, rise)):
+            gain = P[i, i] / (P[i, i] + variance)
+            P[i, i] *= 1.0 - gain
+            s[i] += gain * error
+            turns.append(gain * error)
+        return turns[0]
+
+    def _range(
+        self, camera: Array, width: float, y: Array, var: Array, v_R: Array, spread: float, dt: float
+    ) -> tuple[Array, float, tuple[float, float, float], float]:
+        """Camera to threshold (3,), width, d and spread after one correction."""
+        c = self.config
+        rho = 1.0 / max(float(camera[0]), c.least_range)
+        was = np.array([camera[1] * rho, camera[2] * rho, width * rho])
+        d = np.array([v_R[0] * was[0] - v_R[1], v_R[0] * was[1] - v_R[2], v_R[0] * was[2]])
+        var = var + self._common
+        weights = faded(self._use * float(np.min(var)) / var, d, self._floors)
+        omega = math.sqrt(c.bandwidth * c.bearing_rate)
+        gains = pole_pair(0.5 * (c.bandwidth + c.bearing_rate) / omega, omega, dt)
+        e = y - was
+        got = correct(was, rho, e, d, weights, gains, c.eps, c.limit)
+        X = max(1.0 / got.rho, c.least_range)
+        power = got.observed**2 / (got.observed**2 + c.eps**2)
+        noise = gains[1] * math.sqrt(float(np.sum((weights * d) ** 2 * var))) / (got.observed**2 + c.eps**2) / rho
+        spread = math.hypot(spread * (1.0 - power * c.bandwidth * dt), noise)
+        return (
+            np.array([X, got.z[0] * X, got.z[1] * X]),
+            float(got.z[2] * X),
+            (float(d[0]), float(d[1]), float(d[2])),
+            spread,
+        )
+
+    def _borders(self, camera: Array, width: float, k: Array, var: Array, dt: float) -> Array:
+        """Height and offset from the borders, whose distance is known by now."""
+        gain = 1.0 - math.exp(-self.config.bearing_rate * dt)
+        Z = width / (k[1] - k[0])
+        sigma = Z * math.sqrt(var[0] + var[1]) / (k[1] - k[0])
+        if abs(Z - camera[2]) > 2.0 + 4.0 * sigma + 0.2 * Z:
+            return camera
+        Y = 0.5 * (k[0] + k[1]) * Z
+        return np.array([camera[0], camera[1] + gain * (Y - camera[1]), camera[2] + gain * (Z - camera[2])])
+
+    def _cover(self, s: Array, P: Array, spread: float) -> None:
+        """Covariance of place and width: one scale, and what bearings leave."""
+        length = np.array([s[sc.X], s[sc.Y], s[sc.H], s[sc.WIDTH]])
+        free = 1e-3 * max(abs(s[sc.X]), 50.0)
+        rows = [sc.X, sc.Y, sc.H, sc.WIDTH]
+        P[np.ix_(rows, rows)] = spread**2 * np.outer(length, length) + np.diag(
+            [(10.0 * free) ** 2, free**2, free**2, 0.0]
+        )
+
+
+def _turned(v: Array, angle: float) -> Array:
+    """(2,) in axes turned by `angle` to the right."""
+    c, w = math.cos(angle), math.sin(angle)
+    return np.array([c * v[0] + w * v[1], c * v[1] - w * v[0]])
+
+
+def _bearings_turned(y: Array, angle: float) -> Array:
+    """y1, y2, s in axes turned by `angle` to the right."""
+    c, w = math.cos(angle), math.sin(angle)
+    ahead = c + y[0] * w
+    return np.array([(y[0] * c - w) / ahead, y[1] / ahead, y[2] / ahead**2])

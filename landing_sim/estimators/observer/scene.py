@@ -1,0 +1,93 @@
+"""The unknown runway as an observer carries it, and how the aircraft's own motion moves it.
+
+A camera sees the scene only up to its scale: x, y, H and the runway's width W can all be too large alike and nothing in an
+image tells. What tells is the motion, which inertial data give in metres.
+
+    x_R' = R_RN (v_N - b_v),      W' = 0                        (Gibert et al. 2015, eqs. (1), (17), in the runway's axes)
+
+Source     Gibert et al. 2015, section 4.2. Departs: eq. (17) holds as printed only if omega and v are the motion of the
+           point relative to the camera; the state is carried in levelled axes along the runway, where A = 0 and
+           B = -v_RC, which makes the propagation over a step exact.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from landing_sim.geometry.earth import level_at
+from landing_sim.geometry.so3 import from_euler
+from landing_sim.signals import Residuals
+from landing_sim.types import Array
+
+X, Y, H, COURSE, WIDTH, EPAN, ETILT, BX, BY, BZ = range(10)
+N = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What is believed of the runway and of the way to it. s (N,): x, y, H of the cg [m], the runway's true course [rad],
+    its width [m], the camera's pan and tilt error [rad], and the inertial velocity's bias [m/s] in R."""
+
+    s: Array
+    P: Array  # (N, N)
+    spread: float  # 1 sigma of the range, relative: what is trusted to be the scale's error
+    t_image: float  # [s] of the last image used
+    d: tuple[float, float, float] = (0.0, 0.0, 0.0)  # d1, d2 of the threshold, and that of its width [m/s]
+    misses: int = 0  # images in a row that showed nothing
+    threshold_in_view: bool = False
+    frames: int = 0
+    memory: tuple[float, ...] = ()  # of the ranging's own
+    residuals: Residuals | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Carriage:
+    """The aircraft in the runway's frame: what an inertial reading says under a believed course and place."""
+
+    R_RB: Array  # (3, 3)
+    v_R: Array  # (3,) [m/s] of the cg
+    moved_R: Array  # (3,) [m] since the reading before
+
+
+def carriage(z: Array, s: Array) -> Carriage:
+    """`z` (12,) of an "inertial" measurement seen from the runway `s` (N,).
+
+    The unit is level where the aircraft is, R at the threshold: 0.045 degrees and two metres apart over 5 km.
+    """
+    R_RN = from_course(s)
+    return Carriage(R_RN @ from_euler(z[0], z[1], z[2]), R_RN @ z[6:9] - s[BX:], R_RN @ z[9:12])
+
+
+def from_course(s: Array) -> Array:
+    """R_RN (3, 3) where the aircraft is."""
+    c, w = math.cos(s[COURSE]), math.sin(s[COURSE])
+    R_LN = np.array([[c, w, 0.0], [-w, c, 0.0], [0.0, 0.0, 1.0]])
+    return np.asarray(level_at(np.array([s[X], s[Y], -s[H]])).T @ R_LN)
+
+
+def moved(s: Array, way_R: Array, dt: float) -> Array:
+    """`s` after the cg has moved by way_R (3,) [m] in dt [s], as the inertial unit says."""
+    out = s.copy()
+    way = way_R - s[BX:] * dt
+    out[X] += way[0]
+    out[Y] += way[1]
+    out[H] -= way[2]
+    return out
+
+
+def transition(way_R: Array, dt: float) -> Array:
+    """(N, N) derivative of `moved` by s; a larger course turns the way to the left."""
+    Phi = np.eye(N)
+    Phi[X, COURSE], Phi[Y, COURSE] = way_R[1], -way_R[0]
+    Phi[X, BX], Phi[Y, BY], Phi[H, BZ] = -dt, -dt, dt
+    return Phi
+
+
+def observability(s: Array, v_R: Array) -> tuple[float, float, float]:
+    """d1, d2 of the threshold's middle and that of its width [m/s]: how fast 1 / range moves them through the image."""
+    ahead = max(abs(s[X]), 1.0)
+    y1, y2 = -s[Y] / ahead, s[H] / ahead
+    return float(v_R[0] * y1 - v_R[1]), float(v_R[0] * y2 - v_R[2]), float(v_R[0] * s[WIDTH] / ahead)
