@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Protocol
 
@@ -100,7 +100,7 @@ class RangeObserver(Protocol):
         """On the measured ray, at depth `range_guess` [m]. Raises ValueError if that is not positive and finite."""
 
     def step(self, state: State, y: Array, motion: Motion, dt: float) -> State:
-        """One step of dt [s] with this motion, at whose end y is measured."""
+        """One step of dt [s] with this motion, at whose end y is measured; NaN in y: it was not, the motion carries on."""
 
     def estimate(self, state: State) -> Array:
         """x_hat (3,) [m]."""
@@ -140,14 +140,24 @@ def arrive(
 ) -> State:
     """The state after a step that led to x (3,), if x may be believed.
 
-    A depth that is not positive and finite is not taken: the old estimate is carried by the motion. A correction of the
-    depth by more than the share `limit` is cut to that; bearings stay. `seen` tells whether range was observable.
+    A depth that is not positive and finite is not taken: the old estimate is carried by the motion, or, where that leads
+    through zero, kept. A correction of the depth by more than the share `limit` is cut to that; bearings stay. `seen` tells
+    whether range was observable.
     """
     carried = motion.R @ before.x + motion.t
+    ahead = carried[2] > 0.0
     flag = Flag.GOOD if seen else Flag.UNOBSERVABLE
     if not (np.isfinite(x).all() and x[2] > 0.0):
-        x, flag = carried, Flag.LIMITED
-    elif carried[2] > 0.0 and abs(x[2] / carried[2] - 1.0) > limit:
+        x, flag = carried if ahead else before.x, Flag.LIMITED
+    elif ahead and abs(x[2] / carried[2] - 1.0) > limit:
         allowed = carried[2] * (1.0 + math.copysign(limit, x[2] - carried[2]))
         x, flag = x * (allowed / x[2]), Flag.LIMITED
     return State(x, np.asarray(y, dtype=float), inner, d[0], d[1], flag)
+
+
+def coast(before: State, motion: Motion) -> State:
+    """The state after a step without a measurement: the motion carries the estimate, and stands for what was not seen."""
+    x = motion.R @ before.x + motion.t
+    if not x[2] > 0.0:
+        return replace(before, flag=Flag.LIMITED)
+    return replace(before, x=x, y=x[:2] / x[2], flag=Flag.UNOBSERVABLE)
