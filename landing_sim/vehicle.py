@@ -9,7 +9,8 @@ from pydantic import Field
 
 from landing_sim import config, paths, yamlfile
 from landing_sim.config import Section
-from landing_sim.control.settings import ControlSettings, GuidanceSettings
+from landing_sim.control.settings import ControlSettings, GuidanceSettings, SpeedSettings
+from landing_sim.control.speeds import approach_speed, at_speed
 from landing_sim.errors import ConfigError, VehicleError
 from landing_sim.estimators.belief import AircraftBelief
 
@@ -44,6 +45,20 @@ class Vehicle(Section):
     control: ControlSettings = Field(description="what the controller is designed from")
     believed: AircraftBelief = Field(AircraftBelief(), description="the aircraft as the filter takes it to be")
     guidance: GuidanceSettings = Field(description="what the guidance flies")
+    speeds: SpeedSettings | None = Field(
+        None, description="approach speed from mass and headwind; null = guidance.path.approach_mps and nominal mass"
+    )
+
+    def prepared(self, mass: float, headwind: float, density: float) -> Vehicle:
+        """For one approach, as its crew prepares it: airspeeds and mass [kg] that gains and guidance are made for.
+
+        headwind [m/s], density [kg/m^3] as known on board. Without a speed rule nothing changes.
+        """
+        if self.speeds is None:
+            return self
+        V = approach_speed(self.speeds, mass, headwind, density)
+        control, guidance = at_speed(V, self.control, self.guidance)
+        return self.model_copy(update={"mass_kg": mass, "control": control, "guidance": guidance})
 
 
 def load(name: str) -> Vehicle:

@@ -175,6 +175,26 @@ class CameraSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class SpeedSettings:
+    """Approach speed by rule, calibrated airspeeds: V_ref = max(reference (m / at_mass)^1/2, least), then
+    V_app = V_ref + max(add_least, headwind_share headwind).
+
+    Without it approach_mps is flown whatever the mass.
+    """
+
+    reference_kt: float
+    at_mass_kg: float
+    least_kt: float
+    add_least_kt: float
+    headwind_share: float
+
+    __pydantic_config__ = _STRICT
+
+    def __post_init__(self) -> None:
+        _positive(reference_kt=self.reference_kt, at_mass_kg=self.at_mass_kg, least_kt=self.least_kt)
+
+
+@dataclass(frozen=True, slots=True)
 class ControlSettings:
     """Section `control:`."""
 

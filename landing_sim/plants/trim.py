@@ -120,9 +120,9 @@ def linearise(folder: Path, point: TrimPoint, model: FlightModel | None = None) 
     """A, B, G about `point`, by central differences of the flight model's accelerations.
 
     Thrust [N] is the input and held: its fall with speed is not in A (subtract B_thrust dT/du to add it back).
-    Where the flight model has a delayed downwash, the tail feels it tau late: eps(t - tau) ~ eps - tau deps/dt; with dalpha/dt from dw/dt and du/dt this
-    is x' = A0 x + D c x', so A = (I - D c)^-1 A0, the same for B and G. Wind enters forces only, as -A0[:6, u v w], and
-    dalpha/dt by its own rate: G_dot = -(I - D c)^-1 D c[u v w].
+    Where the flight model has a delayed downwash, the tail feels it tau late, eps(t - tau) ~ eps - tau deps/dt; with
+    dalpha/dt from dw/dt and du/dt this is x' = A0 x + D c x', so A = (I - D c)^-1 A0, the same for B and G. Wind enters
+    forces only, as -A0[:6, u v w], and dalpha/dt by its own rate: G_dot = -(I - D c)^-1 D c[u v w].
     Position and heading do not act on the forces, but height does (density).
     """
     m = FlightModel(folder, 0.005, point.mass) if model is None else model
