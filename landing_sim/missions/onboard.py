@@ -117,9 +117,9 @@ def range_observer(scenario: Scenario, camera: BelievedCamera) -> RunwayObserver
     ranging: Ranging
     if o.ranging == "gibert":
         config = GibertConfig(outputs=o.outputs, attitude=o.attitude, bandwidth=o.bandwidth_rps)
-        ranging = Gibert(config, camera.intrinsics, lever)
+        ranging = Gibert(config, camera.intrinsics)
     else:
-        ranging = KinematicEkf(EkfConfig(), camera.intrinsics, lever)
+        ranging = KinematicEkf(EkfConfig(attitude=o.attitude), camera.intrinsics)
     return RunwayObserver(ObserverConfig(o.first_range_m, o.trust_percent / 100.0), ranging, NOMINAL_WIDTH, lever)
 
 

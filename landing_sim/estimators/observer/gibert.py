@@ -57,8 +57,8 @@ class GibertConfig:
 class Gibert:
     """looking.Ranging with constant gains."""
 
-    def __init__(self, config: GibertConfig, lens: Intrinsics, lever: Array) -> None:
-        self.config, self._lens, self._lever = config, lens, np.asarray(lever, dtype=float)
+    def __init__(self, config: GibertConfig, lens: Intrinsics) -> None:
+        self.config, self._lens = config, lens
         self._use = np.array(
             {"both": (1.0, 1.0, 1.0), "width": (0.0, 0.0, 1.0), "point": (1.0, 1.0, 0.0)}[config.outputs]
         )
@@ -81,30 +81,29 @@ class Gibert:
 
     def look(self, scene: Scene, image: Image, carried: Carriage) -> Scene:
         c, m = self.config, image.edges
-        lever_R = carried.R_RB @ self._lever
         s = scene.s
         if m.geometry is None:
             raise ValueError("a measurement of kind 'edges' needs its EdgeSet")
-        camera = np.array([-s[sc.X] - lever_R[0], -s[sc.Y] - lever_R[1], s[sc.H] - lever_R[2]])  # to the threshold, R
+        ahead = np.array([-s[sc.X], -s[sc.Y], s[sc.H]])  # from the camera to the threshold's middle, R
         seen = bearings(
-            m.z, m.R, m.geometry, self._lens, carried.R_RB, (s[sc.EPAN], s[sc.ETILT]), float(camera[2]), c.attitude
+            m.z, m.R, m.geometry, self._lens, carried.R_RB, (s[sc.EPAN], s[sc.ETILT]), float(ahead[2]), c.attitude
         )
         if seen.turned is None and seen.borders is None and seen.threshold is None:
             return replace(scene, misses=scene.misses + 1, threshold_in_view=False)
         s, P = s.copy(), scene.P.copy()
         turn = self._course(s, P, seen)
-        camera[:2] = _turned(camera[:2], turn)
+        ahead[:2] = _turned(ahead[:2], turn)
         dt = min(max(image.t - scene.t_image, 1e-3), 0.5)
         d, spread = (0.0, 0.0, 0.0), scene.spread
-        in_view = seen.threshold is not None and camera[0] > 0.0
-        if seen.threshold is not None and camera[0] > 0.0:
+        in_view = seen.threshold is not None and ahead[0] > 0.0
+        if seen.threshold is not None and ahead[0] > 0.0:
             y, var = seen.threshold
-            camera, s[sc.WIDTH], d, spread = self._range(
-                camera, s[sc.WIDTH], _bearings_turned(y, turn), var, carried.v_R, spread, dt
+            ahead, s[sc.WIDTH], d, spread = self._range(
+                ahead, s[sc.WIDTH], _bearings_turned(y, turn), var, carried.v_R, spread, dt
             )
         elif seen.borders is not None:
-            camera = self._borders(camera, s[sc.WIDTH], *seen.borders, dt)
-        s[sc.X], s[sc.Y], s[sc.H] = -camera[0] - lever_R[0], -camera[1] - lever_R[1], camera[2] + lever_R[2]
+            ahead = self._borders(ahead, s[sc.WIDTH], *seen.borders, dt)
+        s[sc.X], s[sc.Y], s[sc.H] = -ahead[0], -ahead[1], ahead[2]
         self._cover(s, P, spread)
         return replace(
             scene,
@@ -133,12 +132,12 @@ class Gibert:
         return turns[0]
 
     def _range(
-        self, camera: Array, width: float, y: Array, var: Array, v_R: Array, spread: float, dt: float
+        self, ahead: Array, width: float, y: Array, var: Array, v_R: Array, spread: float, dt: float
     ) -> tuple[Array, float, tuple[float, float, float], float]:
-        """Camera to threshold (3,), width, d and spread after one correction."""
+        """Way to the threshold (3,), width, d and spread after one correction."""
         c = self.config
-        rho = 1.0 / max(float(camera[0]), c.least_range)
-        was = np.array([camera[1] * rho, camera[2] * rho, width * rho])
+        rho = 1.0 / max(float(ahead[0]), c.least_range)
+        was = np.array([ahead[1] * rho, ahead[2] * rho, width * rho])
         d = np.array([v_R[0] * was[0] - v_R[1], v_R[0] * was[1] - v_R[2], v_R[0] * was[2]])
         var = var + self._common
         weights = faded(self._use * float(np.min(var)) / var, d, self._floors)
@@ -157,15 +156,15 @@ class Gibert:
             spread,
         )
 
-    def _borders(self, camera: Array, width: float, k: Array, var: Array, dt: float) -> Array:
+    def _borders(self, ahead: Array, width: float, k: Array, var: Array, dt: float) -> Array:
         """Height and offset from the borders, whose distance is known by now."""
         gain = 1.0 - math.exp(-self.config.bearing_rate * dt)
         Z = width / (k[1] - k[0])
         sigma = Z * math.sqrt(var[0] + var[1]) / (k[1] - k[0])
-        if abs(Z - camera[2]) > 2.0 + 4.0 * sigma + 0.2 * Z:
-            return camera
+        if abs(Z - ahead[2]) > 2.0 + 4.0 * sigma + 0.2 * Z:
+            return ahead
         Y = 0.5 * (k[0] + k[1]) * Z
-        return np.array([camera[0], camera[1] + gain * (Y - camera[1]), camera[2] + gain * (Z - camera[2])])
+        return np.array([ahead[0], ahead[1] + gain * (Y - ahead[1]), ahead[2] + gain * (Z - ahead[2])])
 
     def _cover(self, s: Array, P: Array, spread: float) -> None:
         """Covariance of place and width: one scale, and what bearings leave."""

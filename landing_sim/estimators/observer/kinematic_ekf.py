@@ -1,17 +1,21 @@
-"""The rival on the same state: an extended Kalman filter that ranges an unknown runway by the edges themselves.
+"""The rival: an extended Kalman filter that ranges an unknown runway by its edges.
 
-State: x, y, H of the cg, the runway's course and width, the camera's pan and tilt errors, the inertial velocity's bias (scene.py).
-Measurements are the edge displacements of the 4D filter with the attitude from the inertial unit; errors of attitude that are
-new in every image are states of one image only.
+In units of the runway's width, xi = p_RC / W, an image depends on xi and on directions alone, and with mu = 1 / W
 
-Source     measurement: Dickmanns & Schell 1992, eq. (4), see edge_model.py. That an EKF on x and W ranges on the glide path,
-           where the aim point's bearing does not: own.
+    xi' = mu (v - b),    mu' = 0
+
+is linear: the scale enters by the motion only, where it belongs. (In metres, x, y, H and W, the direction in which the scene
+may be scaled changes with every correction, and the filter takes that for information: it was sure to 1 % of a range 50 %
+off, within a second.) Estimated besides: the runway's course, errors of the camera's mounting, the velocity's bias b.
+
+Source     measurement: Dickmanns & Schell 1992, eq. (4), see edge_model.py; the rest own.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -26,21 +30,27 @@ from landing_sim.signals import Feature, Residuals, Status
 from landing_sim.types import Array
 
 RAD = math.pi / 180.0
-# a scene's states as those of edge_model; a larger course is a smaller heading
-_COLUMNS: np.ndarray = np.array([states.X, states.Y, states.H, states.PSI, states.WIDTH, states.EPAN, states.ETILT])
+XI = slice(sc.X, sc.H + 1)  # (x, y, H) / W
+MU = sc.WIDTH  # 1 / W
+# edge_model's columns for a scene's states; a larger course is a smaller heading, a roll error a larger roll
+_COLUMNS: np.ndarray = np.array(
+    [states.X, states.Y, states.H, states.PSI, states.WIDTH, states.EPAN, states.ETILT, states.PHI]
+)
 _ONE_BLOCK: np.ndarray = np.array([0, sc.N], dtype=np.int64)
 _WITH_NOISE: np.ndarray = np.array([0, sc.N + 3], dtype=np.int64)
+_NO_LEVER = np.zeros(3)
 
 
 @dataclass(frozen=True, slots=True)
 class EkfConfig:
     """Noise of the kinematic filter. Spectral densities are square roots, per sqrt(Hz)."""
 
+    attitude: Literal["inertial", "horizon"] = "inertial"  # whether the horizon's windows count
     first_spread: float = 0.6  # relative, of the first guess of the range
-    q_position: float = 0.05  # [m]
-    q_course: float = 0.005 * RAD
-    q_camera: float = 0.002 * RAD
-    q_bias: float = 0.02  # [m/s]
+    q_position: float = 0.03  # [m]
+    q_course: float = 0.003 * RAD
+    q_camera: float = 0.001 * RAD
+    q_bias: float = 0.01  # [m/s]
     velocity_sigma: float = 0.5  # [m/s] prior of the inertial velocity's bias, each axis
     attitude_noise: float = 0.01 * RAD  # of each image, common to all its edges
     gate_sigma: float = 5.0
@@ -49,77 +59,86 @@ class EkfConfig:
 
 
 class KinematicEkf:
-    """looking.Ranging by a Kalman filter."""
+    """looking.Ranging by a Kalman filter; Scene.own is the covariance in the states xi, course, mu, errors, b."""
 
-    def __init__(self, config: EkfConfig, lens: Intrinsics, lever: Array) -> None:
+    def __init__(self, config: EkfConfig, lens: Intrinsics) -> None:
         self.config = config
         self._focal = np.array([lens.f, lens.cx, lens.cy])
-        self._lever = np.asarray(lever, dtype=float)
         c = config
-        q = np.zeros(sc.N)
-        q[[sc.X, sc.Y, sc.H]] = c.q_position**2
-        q[sc.COURSE], q[[sc.EPAN, sc.ETILT]] = c.q_course**2, c.q_camera**2
-        q[sc.BX :] = c.q_bias**2
-        self._q = q
+        self._q = np.zeros(sc.N)
+        self._q[sc.COURSE] = c.q_course**2
+        self._q[[sc.EPAN, sc.ETILT, sc.EROLL]] = c.q_camera**2
+        self._q[sc.BX :] = c.q_bias**2
 
     def start(self, s: Array, P: Array, t: float) -> Scene:
-        """The guess's error is one of scale: of all lengths together."""
         c = self.config
-        P = P.copy()
-        P[sc.BX :, sc.BX :] = np.eye(3) * c.velocity_sigma**2
-        lengths = np.zeros(sc.N)
-        rows = [sc.X, sc.Y, sc.H, sc.WIDTH]
-        lengths[rows] = s[rows]
-        return Scene(s, P + c.first_spread**2 * np.outer(lengths, lengths), c.first_spread, t)
+        own, mu = P.copy(), 1.0 / s[sc.WIDTH]
+        own[XI, :] *= mu
+        own[:, XI] *= mu
+        own[MU, MU] = (c.first_spread * mu) ** 2
+        own[sc.BX :, sc.BX :] = np.eye(3) * c.velocity_sigma**2
+        return self._scene(Scene(s, P, c.first_spread, t), s, own)
 
     def move(self, scene: Scene, way_R: Array, dt: float) -> Scene:
-        Phi = sc.transition(way_R, dt)
-        P = kalman.predict_dense(scene.P, Phi, np.diag(self._q * dt), _ONE_BLOCK)
-        return replace(scene, s=sc.moved(scene.s, way_R, dt), P=P)
+        s, own = scene.s, scene.own
+        assert own is not None  # `start` made it
+        mu = 1.0 / s[sc.WIDTH]
+        way = way_R - s[sc.BX :] * dt
+        Phi = np.eye(sc.N)
+        Phi[XI, MU] = way * (1.0, 1.0, -1.0)
+        Phi[sc.X, sc.COURSE], Phi[sc.Y, sc.COURSE] = mu * way[1], -mu * way[0]
+        Phi[sc.X, sc.BX], Phi[sc.Y, sc.BY], Phi[sc.H, sc.BZ] = -mu * dt, -mu * dt, mu * dt
+        q = self._q * dt
+        q[XI] = (self.config.q_position * mu) ** 2 * dt
+        own = kalman.predict_dense(own, Phi, np.diag(q), _ONE_BLOCK)
+        return self._scene(scene, sc.moved(s, way_R, dt), own)
 
     def look(self, scene: Scene, image: Image, carried: Carriage) -> Scene:
-        c, m = self.config, image.edges
+        c, m, own = self.config, image.edges, scene.own
         edges = m.geometry
-        if edges is None:
-            raise ValueError("a measurement of kind 'edges' needs its EdgeSet")
-        n = len(m.z)
-        found = np.isfinite(m.z)
+        if edges is None or own is None:
+            raise ValueError("a measurement of kind 'edges' needs its EdgeSet, and a start before it")
+        n, W = len(m.z), float(scene.s[sc.WIDTH])
         h, Hx = np.empty(n), np.empty((n, states.N))
         x = np.zeros(states.N)
-        x[_COLUMNS] = scene.s[: len(_COLUMNS)]
         x[states.PHI : states.PSI + 1] = to_euler(carried.R_RB)
+        x[_COLUMNS[:-1]] += scene.s[: sc.EROLL]
+        x[states.PSI] -= scene.s[sc.COURSE]
+        x[states.PHI] += scene.s[sc.EROLL]
         edge_model(
-            x, edges.feature, edges.centre, edges.direction, edges.pan, edges.tilt,
-            self._lever, self._focal, 0.0, h, Hx,
-        )  # fmt: skip
-        Hn = np.zeros((n, sc.N))
+            x, edges.feature, edges.centre, edges.direction, edges.pan, edges.tilt, _NO_LEVER, self._focal, 0.0, h, Hx
+        )
+        Hn = np.zeros((n, sc.N + 3))
         Hn[:, : len(_COLUMNS)] = Hx[:, _COLUMNS]
         Hn[:, sc.COURSE] *= -1.0
+        Hn[:, XI] *= W
+        Hn[:, MU] = 0.0  # a scene scaled looks the same
+        # the attitude's own noise is new in every image and moves all its windows together: three states of this image
+        Hn[:, sc.N :] = Hx[:, states.PHI : states.PSI + 1] * c.attitude_noise
+        P = np.zeros((sc.N + 3, sc.N + 3))
+        P[: sc.N, : sc.N] = own
+        P[sc.N :, sc.N :] = np.eye(3)
+        found = np.isfinite(m.z)
+        if c.attitude == "inertial":  # the horizon's dip depends on the scale, which would be taken for known
+            found = found & (edges.feature != Feature.HORIZON)
         nu = np.where(found, m.z - h, 0.0)
         use: np.ndarray = found & np.isfinite(nu)
-        # what the attitude's own noise moves, it moves in all windows together: taken as three more states of this image
-        noise = Hx[:, states.PHI : states.PSI + 1] * c.attitude_noise
-        H_all = np.ascontiguousarray(np.hstack([Hn, noise]))
-        P_all = np.zeros((sc.N + 3, sc.N + 3))
-        P_all[: sc.N, : sc.N] = scene.P
-        P_all[sc.N :, sc.N :] = np.eye(3)
         R = np.where(found, m.R, 1.0)
         status = edges.status.copy()
-        s2 = kalman.innovation_variance(P_all, H_all, R)
+        s2 = kalman.innovation_variance(P, Hn, R)
         if scene.frames >= c.start_frames:
             use &= nu * nu <= c.gate_sigma**2 * s2
             status[found & ~use] = Status.REJECTED
         else:
             R = R * np.maximum(1.0, np.abs(nu) / (c.huber * np.sqrt(s2)))
-        P_new, step, nis = kalman.update_dense(P_all, H_all, R, nu, use, _WITH_NOISE)
-        dof = int(use.sum())
+        P, step, nis = kalman.update_dense(P, Hn, R, nu, use, _WITH_NOISE)
         s = scene.s + step[: sc.N]
-        P = np.ascontiguousarray(P_new[: sc.N, : sc.N])
-        return replace(
+        mu = max(1.0 / W + step[MU], 0.2 / W)
+        s[sc.WIDTH] = 1.0 / mu
+        s[XI] = (scene.s[XI] / W + step[XI]) / mu
+        dof = int(use.sum())
+        after = replace(
             scene,
-            s=s,
-            P=P,
-            spread=math.sqrt(max(P[sc.WIDTH, sc.WIDTH], 0.0)) / max(abs(s[sc.WIDTH]), 1.0),
             t_image=image.t,
             d=sc.observability(s, carried.v_R),
             misses=0 if dof else scene.misses + 1,
@@ -127,3 +146,13 @@ class KinematicEkf:
             frames=scene.frames + 1,
             residuals=Residuals(np.where(found, m.z - h, np.nan), status, nis, dof),
         )
+        return self._scene(after, s, np.ascontiguousarray(P[: sc.N, : sc.N]))
+
+    def _scene(self, scene: Scene, s: Array, own: Array) -> Scene:
+        """With the covariance in metres for whoever reads the scene."""
+        W = float(s[sc.WIDTH])
+        T = np.eye(sc.N)
+        T[XI, XI] *= W
+        T[XI, MU] = -s[XI] * W
+        T[MU, MU] = -W * W
+        return replace(scene, s=s, own=own, P=T @ own @ T.T, spread=W * math.sqrt(max(own[MU, MU], 0.0)))

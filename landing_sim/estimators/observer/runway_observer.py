@@ -104,7 +104,9 @@ class RunwayObserver:
         s = scene.s
         carried = carriage(z, s)
         since = memory.t - memory.t_inertial
-        p = np.array([s[sc.X], s[sc.Y], s[sc.H]]) + carried.v_R * (1.0, 1.0, -1.0) * since
+        way = carried.v_R * since - carried.R_RB @ self._lever
+        p = s[sc.X], s[sc.Y], s[sc.H]
+        p = p[0] + way[0], p[1] + way[1], p[2] - way[2]
         uvw = carried.R_RB.T @ carried.v_R
         phi, theta, psi = to_euler(carried.R_RB)
         mean = np.array([
@@ -123,8 +125,11 @@ class RunwayObserver:
 
     def _inertial(self, memory: Memory, z: Array) -> Memory:
         scene, dt = memory.scene, memory.t - memory.t_inertial
-        if scene is not None:
-            scene = self.ranging.move(scene, sc.from_course(scene.s) @ z[9:12], dt)
+        if scene is not None and memory.inertial is not None:
+            before = memory.inertial
+            R_RN = sc.from_course(scene.s)
+            lever = (from_euler(z[0], z[1], z[2]) - from_euler(before[0], before[1], before[2])) @ self._lever
+            scene = self.ranging.move(scene, R_RN @ (z[9:12] + lever), dt)
         return replace(memory, inertial=z, t_inertial=memory.t, scene=scene)
 
     def _wind(self, memory: Memory, flow: Array) -> Memory:
@@ -149,20 +154,20 @@ class RunwayObserver:
         c, z = self.config, memory.inertial
         if z is None:
             return memory
-        lever = from_euler(*m.z[3:]) @ self._lever * (1.0, 1.0, -1.0)
-        camera = m.z[:3] + lever
+        camera = m.z[:3] + from_euler(m.z[3], m.z[4], m.z[5]) @ self._lever * (1.0, 1.0, -1.0)
         if memory.scene is not None and memory.trusted:
             factor = memory.scene.s[sc.WIDTH] / self._nominal
         else:
             factor = 1.0 if c.first_range is None else c.first_range / math.hypot(camera[0], camera[1])
         s = np.zeros(sc.N)
-        s[[sc.X, sc.Y, sc.H]] = factor * camera - lever
+        s[[sc.X, sc.Y, sc.H]] = factor * camera
         s[sc.WIDTH] = factor * self._nominal
         s[sc.COURSE] = wrap(z[2] - m.z[5])
         P = np.zeros((sc.N, sc.N))
         rows = [sc.X, sc.Y, sc.H]
         P[np.ix_(rows, rows)] = factor**2 * m.R[:3, :3]
-        P[[sc.EPAN, sc.ETILT], [sc.EPAN, sc.ETILT]] = c.camera_sigma**2
+        for error in (sc.EPAN, sc.ETILT, sc.EROLL):
+            P[error, error] = c.camera_sigma**2
         # the acquired heading is the camera's: an error of its mounting is in the course as well
         P[sc.COURSE, sc.COURSE] = m.R[5, 5] + c.camera_sigma**2
         P[sc.COURSE, sc.EPAN] = P[sc.EPAN, sc.COURSE] = -(c.camera_sigma**2)

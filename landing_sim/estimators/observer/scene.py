@@ -22,14 +22,14 @@ from landing_sim.geometry.so3 import from_euler
 from landing_sim.signals import Residuals
 from landing_sim.types import Array
 
-X, Y, H, COURSE, WIDTH, EPAN, ETILT, BX, BY, BZ = range(10)
-N = 10
+X, Y, H, COURSE, WIDTH, EPAN, ETILT, EROLL, BX, BY, BZ = range(11)
+N = 11
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """What is believed of the runway and of the way to it. s (N,): x, y, H of the cg [m], the runway's true course [rad],
-    its width [m], the camera's pan and tilt error [rad], and the inertial velocity's bias [m/s] in R."""
+    """What is believed of the runway and of the way to it. s (N,): x, y, H of the camera [m], the runway's true course
+    [rad], its width [m], the camera's pan, tilt and roll error [rad], and the inertial velocity's bias [m/s] in R."""
 
     s: Array
     P: Array  # (N, N)
@@ -39,7 +39,7 @@ class Scene:
     misses: int = 0  # images in a row that showed nothing
     threshold_in_view: bool = False
     frames: int = 0
-    memory: tuple[float, ...] = ()  # of the ranging's own
+    own: Array | None = None  # what the ranging keeps for itself
     residuals: Residuals | None = None
 
 
@@ -49,7 +49,6 @@ class Carriage:
 
     R_RB: Array  # (3, 3)
     v_R: Array  # (3,) [m/s] of the cg
-    moved_R: Array  # (3,) [m] since the reading before
 
 
 def carriage(z: Array, s: Array) -> Carriage:
@@ -58,7 +57,7 @@ def carriage(z: Array, s: Array) -> Carriage:
     The unit is level where the aircraft is, R at the threshold: 0.045 degrees and two metres apart over 5 km.
     """
     R_RN = from_course(s)
-    return Carriage(R_RN @ from_euler(z[0], z[1], z[2]), R_RN @ z[6:9] - s[BX:], R_RN @ z[9:12])
+    return Carriage(R_RN @ from_euler(z[0], z[1], z[2]), R_RN @ z[6:9] - s[BX:])
 
 
 def from_course(s: Array) -> Array:
@@ -69,21 +68,13 @@ def from_course(s: Array) -> Array:
 
 
 def moved(s: Array, way_R: Array, dt: float) -> Array:
-    """`s` after the cg has moved by way_R (3,) [m] in dt [s], as the inertial unit says."""
+    """`s` after the camera has moved by way_R (3,) [m] in dt [s], as the inertial unit says."""
     out = s.copy()
     way = way_R - s[BX:] * dt
     out[X] += way[0]
     out[Y] += way[1]
     out[H] -= way[2]
     return out
-
-
-def transition(way_R: Array, dt: float) -> Array:
-    """(N, N) derivative of `moved` by s; a larger course turns the way to the left."""
-    Phi = np.eye(N)
-    Phi[X, COURSE], Phi[Y, COURSE] = way_R[1], -way_R[0]
-    Phi[X, BX], Phi[Y, BY], Phi[H, BZ] = -dt, -dt, dt
-    return Phi
 
 
 def observability(s: Array, v_R: Array) -> tuple[float, float, float]:
