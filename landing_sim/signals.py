@@ -232,8 +232,9 @@ class Estimate:
 class Reference:
     """What guidance asks of the controller.
 
-    `mode` is the flight phase, in order: "acquire", "capture", "glide", "flare", "decrab", "rollout", "stopped",
-    or "go_around". Angles in rad, SI. Feed-forward terms are zero where unused.
+    `mode` is the flight phase, in order: "acquire", "hold" (only while an estimate flags `range_valid` False), "capture",
+    "glide", "flare", "decrab", "rollout", "stopped", or "go_around". Angles in rad, SI.
+    Feed-forward terms are zero where unused.
     """
 
     mode: str

@@ -1,4 +1,4 @@
-"""What to fly: capture of the centreline, glide, flare, decrab, rollout, and when to give up.
+"""What to fly: hold until range is known, capture of the centreline, glide, flare, decrab, rollout, and when to give up.
 
 Heights along the path are those of the main wheels, at the wheels' place along the runway: the cg is most of two metres
 higher, which at a flare's angle is most of a hundred metres of runway.
@@ -19,7 +19,7 @@ from landing_sim.control.settings import GearSettings, GuidanceSettings, PathSet
 from landing_sim.signals import Estimate, Reference
 
 GRAVITY = 9.80665
-AIRBORNE = ("acquire", "capture", "glide", "flare", "decrab")
+AIRBORNE = ("acquire", "hold", "capture", "glide", "flare", "decrab")
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +35,7 @@ class GuidanceMemory:
     bounced: bool = False  # airborne again after touchdown
     blind: float = 0.0  # [s] looked for the runway in vain
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of a go-around: time [s], height [m], climb rate [m/s]
+    heading: float = 0.0  # [rad] held while the range is not known
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,11 +163,14 @@ class LandingGuidance:
             memory.bounced or (memory.mode == "rollout" and mode == "decrab"),
             memory.blind,
             (estimate.t, b.H, m.H_dot) if started else memory.start,
+            b.psi if mode == "hold" and memory.mode != mode else memory.heading,
         )
         if mode == "rollout" or mode == "stopped":
             return memory, Reference(mode, 0.0, b.H, 0.0, 0.0, 0.0, 0.0)
         if mode == "go_around":
             return memory, self._go_around(memory, b, m)
+        if mode == "hold":
+            return memory, self._hold(memory, b, m, wheels[0])
         return memory, self._approach(memory, b, m, wheels)
 
     # ------------------------------------------------------------------------------------------------ references
@@ -209,6 +213,17 @@ class LandingGuidance:
         }
         return Reference(memory.mode, V, b.H + error, slope * m.x_dot, y, psi, phi, 0.0, r, extra)
 
+    def _hold(self, memory: GuidanceMemory, b: Believed, m: Motion, height: float) -> Reference:
+        """Straight on down the glide's angle, for want of a place to steer for: only velocity and attitude are known."""
+        extra = {
+            "crosswind": memory.crosswind,
+            "downdraught": memory.downdraught,
+            "wheel_height": height,
+            "on_path": 0.0,
+        }
+        fall = -self.path.slope * math.hypot(m.x_dot, m.y_dot)
+        return Reference("hold", self.path.approach, b.H, fall, b.y, memory.heading, 0.0, extra=extra)
+
     def _go_around(self, memory: GuidanceMemory, b: Believed, m: Motion) -> Reference:
         """Round out at a constant pull into a steady climb, wings level, heading kept along the runway."""
         g = self.settings.go_around
@@ -240,6 +255,11 @@ class LandingGuidance:
         if mode == "go_around" or mode == "stopped":
             return mode, 0.0
         down = estimate.flags.get("on_ground")
+        g = s.go_around
+        if mode in ("acquire", "hold") and not down and not estimate.flags.get("range_valid", True):
+            waiting = memory.waiting + dt if mode == "hold" else 0.0
+            lost = not estimate.valid and estimate.t - memory.seen > g.blackout_s
+            return ("go_around", 0.0) if lost or waiting > g.hold_s or height < g.hold_height_m else ("hold", waiting)
         if mode == "rollout":
             if height > s.bounce_height_m and not down:
                 return "decrab", 0.0
@@ -250,7 +270,6 @@ class LandingGuidance:
                 return "rollout", 0.0
             return mode, waiting
         waiting = 0.0
-        g = s.go_around
         if height > g.decision_height_m and mode != "acquire":
             if not estimate.valid and estimate.t - memory.seen > g.blackout_s:
                 return "go_around", 0.0
@@ -258,7 +277,7 @@ class LandingGuidance:
                 waiting = memory.waiting + dt
                 if waiting > g.unstable_s:
                     return "go_around", 0.0
-        if mode in ("acquire", "capture") and abs(b.y) > s.capture.end_m:
+        if mode in ("acquire", "hold", "capture") and abs(b.y) > s.capture.end_m:
             mode = "capture"
         elif height <= s.decrab.start_height_m:
             mode = "decrab"

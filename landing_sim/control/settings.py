@@ -312,6 +312,8 @@ class GoAroundSettings:
     climb_deg: float
     pull_mps2: float = 1.5
     acquire_s: float = 3.0  # without a runway found: climb away
+    hold_s: float = 40.0  # without its range known: climb away, and
+    hold_height_m: float = 60.0  # below this wheel height
 
     __pydantic_config__ = _STRICT
 

@@ -138,7 +138,8 @@ def reactions(
         limit = math.sqrt(max(grip * grip - f_along * f_along, 0.0))
         if abs(f_across) > limit:
             f_across = math.copysign(limit, f_across)
-            b = -f_across / k
+            # no further than the spring alone slips: set there, it would swing back within a step and push the other way
+            b = min(max(b, -limit / k), limit / k)
         bristle[i, 1] = b
 
         force = normal * n_B + f_along * along + f_across * across

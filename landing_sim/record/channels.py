@@ -56,6 +56,7 @@ SERIES = (  # entity, title, ((column, name, factor), ...)
 )
 MODE_COLOURS = {
     "acquire": 0x8D99AEFF,
+    "hold": 0xB5A7D6FF,
     "capture": 0x4CC9F0FF,
     "glide": 0x4895EFFF,
     "flare": 0xF9A03FFF,
