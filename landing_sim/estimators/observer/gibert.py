@@ -36,8 +36,9 @@ RAD = math.pi / 180.0
 
 @dataclass(frozen=True, slots=True)
 class GibertConfig:
-    """bandwidth [rad/s] of the range; bearing_rate [1/s] of the bearings; eps [m/s] of angular motion below which the
-    range is carried; velocity_sigma [m/s] believed of the inertial unit; first_spread: relative, of the first guess."""
+    """bandwidth [rad/s] of the range, a double pole; bearing_rate [1/s] of the bearings; eps [m/s] of angular motion below
+    which the range is carried; velocity_sigma [m/s] believed of the inertial unit; first_spread: relative, of the first
+    guess. The error is believed to fall at half the bandwidth, since a double pole's begins slowly."""
 
     outputs: Literal["both", "width", "point"] = "both"
     attitude: Literal["inertial", "horizon"] = "inertial"
@@ -141,20 +142,18 @@ class Gibert:
         d = np.array([v_R[0] * was[0] - v_R[1], v_R[0] * was[1] - v_R[2], v_R[0] * was[2]])
         var = var + self._common
         weights = faded(self._use * float(np.min(var)) / var, d, self._floors)
-        omega = math.sqrt(c.bandwidth * c.bearing_rate)
-        gains = pole_pair(0.5 * (c.bandwidth + c.bearing_rate) / omega, omega, dt)
         e = y - was
-        got = correct(was, rho, e, d, weights, gains, c.eps, c.limit)
+        # poles: the range's twice for the width, the range's and the bearings' for these
+        l1, l2 = pole_pair(1.0, c.bandwidth, dt)
+        fast, slow = 1.0 - math.exp(-c.bearing_rate * dt), 1.0 - math.exp(-c.bandwidth * dt)
+        share = np.array([fast / slow, fast / slow, 1.0])
+        got = correct(was, rho, e * share, d, weights, (l1, l2), c.eps, c.limit)
+        below = got.observed**2 + c.eps**2
+        noise = l2 * math.sqrt(float(np.sum((weights * d * share) ** 2 * var))) / (below * rho)
+        spread = math.hypot(spread * (1.0 - got.observed**2 / below * 0.5 * c.bandwidth * dt), noise)
         X = max(1.0 / got.rho, c.least_range)
-        power = got.observed**2 / (got.observed**2 + c.eps**2)
-        noise = gains[1] * math.sqrt(float(np.sum((weights * d) ** 2 * var))) / (got.observed**2 + c.eps**2) / rho
-        spread = math.hypot(spread * (1.0 - power * c.bandwidth * dt), noise)
-        return (
-            np.array([X, got.z[0] * X, got.z[1] * X]),
-            float(got.z[2] * X),
-            (float(d[0]), float(d[1]), float(d[2])),
-            spread,
-        )
+        bearing = was[:2] + fast * e[:2]
+        return np.array([X, *(bearing * X)]), float(got.z[2] * X), (float(d[0]), float(d[1]), float(d[2])), spread
 
     def _borders(self, ahead: Array, width: float, k: Array, var: Array, dt: float) -> Array:
         """Height and offset from the borders, whose distance is known by now."""

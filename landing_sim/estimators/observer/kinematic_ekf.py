@@ -4,9 +4,9 @@ In units of the runway's width, xi = p_RC / W, an image depends on xi and on dir
 
     xi' = mu (v - b),    mu' = 0
 
-is linear: the scale enters by the motion only, where it belongs. (In metres, x, y, H and W, the direction in which the scene
-may be scaled changes with every correction, and the filter takes that for information: it was sure to 1 % of a range 50 %
-off, within a second.) Estimated besides: the runway's course, errors of the camera's mounting, the velocity's bias b.
+is linear: the scale enters by the motion only, where it belongs. (In metres, x, y, H and W, the direction in which the
+scene may be scaled changes with every correction, and the filter takes that for information: it was sure to 1 % of a range
+50 % off, within a second.) Estimated besides: the runway's course, errors of the camera's mounting, the velocity's bias b.
 
 Source     measurement: Dickmanns & Schell 1992, eq. (4), see edge_model.py; the rest own.
 """
@@ -86,7 +86,7 @@ class KinematicEkf:
         way = way_R - s[sc.BX :] * dt
         Phi = np.eye(sc.N)
         Phi[XI, MU] = way * (1.0, 1.0, -1.0)
-        Phi[sc.X, sc.COURSE], Phi[sc.Y, sc.COURSE] = mu * way[1], -mu * way[0]
+        Phi[sc.X, sc.COURSE], Phi[sc.Y, sc.COURSE] = mu * way_R[1], -mu * way_R[0]
         Phi[sc.X, sc.BX], Phi[sc.Y, sc.BY], Phi[sc.H, sc.BZ] = -mu * dt, -mu * dt, mu * dt
         q = self._q * dt
         q[XI] = (self.config.q_position * mu) ** 2 * dt
