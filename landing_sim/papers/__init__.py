@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-PAPERS = ("dickmanns-1992",)
+if TYPE_CHECKING:
+    from landing_sim.papers.paper import Paper
+
+PAPERS = ("dickmanns-1992", "gibert-2015")
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,24 +21,43 @@ class Reproduction:
     report: Path
 
 
+def load(name: str) -> Paper:
+    """Raises KeyError if there is no such paper."""
+    from landing_sim.papers.paper import Paper
+
+    if name == "dickmanns-1992":
+        from landing_sim.papers import dickmanns_1992 as dickmanns
+        from landing_sim.papers import dickmanns_figures, flying
+
+        text = (dickmanns.NAME, dickmanns.TITLE, dickmanns.LEAD, dickmanns.FIGURES, "Flights", dickmanns.RUNS)
+        return Paper(*text, dickmanns.CLAIMS, flying.fly, dickmanns_figures.figures)
+    if name == "gibert-2015":
+        from landing_sim.papers import gibert_2015 as gibert
+        from landing_sim.papers import gibert_figures
+
+        text = (gibert.NAME, gibert.TITLE, gibert.LEAD, gibert.FIGURES, "Simulations", gibert.RUNS)
+        return Paper(*text, gibert.CLAIMS, gibert.perform, gibert_figures.figures)
+    raise KeyError(f"no such paper: {name!r}; there are: {', '.join(PAPERS)}")
+
+
 def reproduce(paper: str, folder: Path, watch: Callable[[str], None] = lambda line: None) -> Reproduction:
-    """Fly everything the paper's claims need, judge them, write `report.html` and `claims.json` into `folder`.
+    """Carry out everything the paper's claims need, judge them, write `report.html` and `claims.json` into `folder`.
 
     watch : is told what starts, a line at a time. Raises KeyError if the paper is not one of PAPERS.
     """
-    if paper not in PAPERS:
-        raise KeyError(f"no such paper: {paper!r}; there are: {', '.join(PAPERS)}")
+    chosen = load(paper)
     import json
 
-    from landing_sim.papers import claims, figures, flying, report
-    from landing_sim.papers import dickmanns_1992 as chosen
+    from landing_sim.papers import claims, report
+    from landing_sim.record.log import versions
 
-    flown = flying.fly_all(claims.runs_of(chosen.CLAIMS), lambda run: watch(report.told(run)))
-    rows = claims.evaluate(chosen.CLAIMS, flown)
+    results = {}
+    for job in claims.runs_of(chosen.claims):
+        watch(job.told())
+        results[job] = chosen.perform(job)
+    rows = claims.evaluate(chosen.claims, results)
     watch("drawing")
-    versions = next(iter(flown.values())).log.meta["versions"]
-    text = report.html(chosen.TITLE, rows, figures.figures(flown), versions)
-    report.write(text, folder / "report.html")
-    result = claims.to_json(chosen.NAME, rows)
+    report.write(report.html(chosen, rows, chosen.figures(results), versions()), folder / "report.html")
+    result = claims.to_json(chosen.name, rows)
     report.write(json.dumps(result, indent=1, allow_nan=False) + "\n", folder / "claims.json")
     return Reproduction(result, folder / "report.html")

@@ -1,34 +1,25 @@
-"""A paper's claims as data: what it says, how that is measured in our flights, and what then is the verdict."""
+"""A paper's claims as data: what it says, how that is measured, and what then is the verdict."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
-
-from landing_sim.record.log import FlightLog
+from typing import Any, Literal, Protocol
 
 Outcome = Literal["met", "not_met", "not_comparable"]
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
-    """One flight: a shipped scenario, changes to it as with ``--set``, a seed, and who flies."""
+class Job(Protocol):
+    """Something to carry out once for all claims that need it: a flight, a simulation. Hashable by what it does."""
 
-    scenario: str
-    changes: tuple[str, ...] = ()
-    seed: int = 1
-    pilot: bool = False  # flown by the scripted pilot, the filter only watching
+    def told(self) -> str:
+        """One line for whoever waits."""
 
+    def setting(self) -> tuple[str, str]:
+        """What it is, and what was changed or chosen: the report's list of them, but for the seeds."""
 
-@dataclass(frozen=True, slots=True)
-class Flown:
-    """A flight's log, with the time that its onboard work took."""
-
-    log: FlightLog
-    cycle_ms: float = math.nan  # median onboard work of a cycle: vision, estimation, guidance, control
-    estimator_ms: float = math.nan  # of it the filter's
+    def seeds(self) -> tuple[int, ...]: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,15 +30,16 @@ class Measured:
     note: str = ""
 
 
-Measure = Callable[[Sequence[Flown]], Measured]
+Measure = Callable[[Sequence[Any]], Measured]
+"""From the results of a claim's jobs, in their order."""
 
 
 @dataclass(frozen=True, slots=True)
 class Claim:
     """One statement of a paper.
 
-    how : what is measured in our flights, in words
-    measure : does so; it gets the flights of `runs` in that order
+    how : what is measured, in words
+    measure : does so; it gets the results of `runs` in that order
     met : whether a value agrees with the paper; None where nothing can be compared, and `reason` says why
     """
 
@@ -57,7 +49,7 @@ class Claim:
     paper_value: float | None
     unit: str
     how: str
-    runs: tuple[Run, ...]
+    runs: tuple[Job, ...]
     measure: Measure
     met: Callable[[float], bool] | None
     reason: str = ""
@@ -85,12 +77,12 @@ def at_least(limit: float) -> Callable[[float], bool]:
     return lambda value: value >= limit
 
 
-def runs_of(claims: Iterable[Claim]) -> tuple[Run, ...]:
-    """Every flight that any claim needs, once, in order of first mention."""
+def runs_of(claims: Iterable[Claim]) -> tuple[Job, ...]:
+    """Every job that any claim needs, once, in order of first mention."""
     return tuple(dict.fromkeys(run for claim in claims for run in claim.runs))
 
 
-def evaluate(claims: Iterable[Claim], flown: Mapping[Run, Flown]) -> list[Row]:
+def evaluate(claims: Iterable[Claim], flown: Mapping[Any, Any]) -> list[Row]:
     """The verdict on each claim. A value that does not exist (NaN) meets nothing."""
     rows = []
     for claim in claims:

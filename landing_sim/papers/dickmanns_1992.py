@@ -11,12 +11,23 @@ from __future__ import annotations
 import math
 
 from landing_sim.papers import measures as m
-from landing_sim.papers.claims import Claim, Measure, Run, about, at_least, at_most
+from landing_sim.papers.claims import Claim, Measure, about, at_least, at_most
+from landing_sim.papers.flights import Run
 from landing_sim.record.judge import captured_after
 from landing_sim.record.log import FlightLog
 
 NAME = "dickmanns-1992"
 TITLE = "Dickmanns & Schell 1992: Visual Autonomous Automatic Landing of Airplanes"
+LEAD = (
+    "What the paper claims, and what came out when its landing was flown again: every number of section 7, with the "
+    "verdict first. Our values are the errors of the estimate against the simulation's truth, from 1.5 s after the runway "
+    "was acquired until touchdown."
+)
+FIGURES = "The paper's own curves are not at hand as data. Its claimed figures are the dashed green lines."
+RUNS = (
+    "Each can be flown again, to the same bits, with landing-sim run SCENARIO --set … --seed N; the scripted pilot's are "
+    "flown by this report only."
+)
 SEEDS = range(1, 9)
 
 GUST = tuple(Run("do128/gust", seed=seed) for seed in SEEDS)

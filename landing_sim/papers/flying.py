@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +14,7 @@ from landing_sim import scenario, vehicle
 from landing_sim.interfaces import Controller, Estimator, FrontEnd, Guidance
 from landing_sim.missions import runway_landing
 from landing_sim.noise import Noise
-from landing_sim.papers.claims import Flown, Run
+from landing_sim.papers.flights import Flown, Run
 from landing_sim.papers.pilot import Eyes, PilotController, PilotGuidance
 from landing_sim.record.log import FlightLog, LogBuilder
 from landing_sim.sensors.reference import (
@@ -24,15 +24,6 @@ from landing_sim.sensors.reference import (
     RadarAltimeterConfig,
 )
 from landing_sim.signals import CameraSample, Command, Estimate, Frame, Measurement, Reference, Sample
-
-
-def fly_all(runs: Iterable[Run], watch: Callable[[Run], None] = lambda run: None) -> dict[Run, Flown]:
-    """Every run once; `watch` is told of each before it starts."""
-    flown = {}
-    for run in runs:
-        watch(run)
-        flown[run] = fly(run)
-    return flown
 
 
 def fly(run: Run) -> Flown:

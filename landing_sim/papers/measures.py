@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from landing_sim.papers.claims import Flown, Measure, Measured
+from landing_sim.papers.claims import Measure, Measured
+from landing_sim.papers.flights import Flown
 from landing_sim.record.judge import counted, measure, threshold_in_view
 from landing_sim.record.log import FlightLog
 from landing_sim.types import Array

@@ -8,21 +8,22 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from landing_sim.papers.claims import Row, Run
-from landing_sim.papers.figures import Figure
+from landing_sim.papers.claims import Row
+from landing_sim.papers.drawing import Figure
+from landing_sim.papers.paper import Paper
 from landing_sim.papers.template import TEMPLATE
 
 _WORDS = {"met": "met", "not_met": "not met", "not_comparable": "not comparable"}
 
 
-def html(title: str, rows: Sequence[Row], figures: Sequence[Figure], versions: Mapping[str, str]) -> str:
+def html(paper: Paper, rows: Sequence[Row], figures: Sequence[Figure], versions: Mapping[str, str]) -> str:
     """The report's text. Same rows and figures, same bytes."""
     import jinja2
 
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters["number"] = number
     return environment.from_string(TEMPLATE).render(
-        title=title,
+        paper=paper,
         rows=rows,
         words=_WORDS,
         counts={verdict: sum(row.verdict == verdict for row in rows) for verdict in _WORDS},
@@ -58,21 +59,21 @@ def number(value: float | None) -> str:
 
 
 def _settings(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
-    """(scenario and who flies, changes, seeds) of every group of flights."""
-    groups: dict[tuple[str, bool, tuple[str, ...]], list[int]] = {}
+    """(what, changes, seeds) of every group of jobs."""
+    groups: dict[tuple[str, str], list[int]] = {}
     for run in dict.fromkeys(run for row in rows for run in row.claim.runs):
-        groups.setdefault((run.scenario, run.pilot, run.changes), []).append(run.seed)
-    return [
-        (
-            name + (", flown by the scripted pilot" if pilot else ""),
-            "  ".join(changes),
-            ", ".join(map(str, sorted(seeds))),
-        )
-        for (name, pilot, changes), seeds in groups.items()
-    ]
+        groups.setdefault(run.setting(), []).extend(run.seeds())
+    return [(name, changes, _spans(sorted(set(seeds))) or "–") for (name, changes), seeds in groups.items()]
 
 
-def told(run: Run) -> str:
-    """One line about a flight that starts, for whoever waits."""
-    who = "scripted pilot" if run.pilot else "autopilot"
-    return f"{run.scenario} seed {run.seed} ({who}) {' '.join(run.changes)}".rstrip()
+def _spans(numbers: Sequence[int]) -> str:
+    """1, 2, 3, 7 as "1–3, 7"."""
+    spans: list[list[int]] = []
+    for n in numbers:
+        if spans and n == spans[-1][-1] + 1:
+            spans[-1].append(n)
+        else:
+            spans.append([n])
+    return ", ".join(
+        str(s[0]) if len(s) == 1 else f"{s[0]}, {s[-1]}" if len(s) == 2 else f"{s[0]}–{s[-1]}" for s in spans
+    )

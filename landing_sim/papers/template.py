@@ -7,7 +7,7 @@ TEMPLATE = """<!doctype html>
 <head>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{{ title }}</title>
+<title>{{ paper.title }}</title>
 <style>
 :root { --ink: #1d2433; --soft: #5c677d; --line: #e3e7ee; --good: #2d6a4f; --bad: #b23a2e; --none: #6c757d; }
 * { box-sizing: border-box; }
@@ -45,10 +45,8 @@ code { font: 12.5px ui-monospace, Menlo, Consolas, monospace; }
 </head>
 <body>
 <main>
-<h1>{{ title }}</h1>
-<p class="lead">What the paper claims, and what came out when its landing was flown again: every number of section 7, with
-the verdict first. Our values are the errors of the estimate against the simulation's truth, from 1.5 s after the runway was
-acquired until touchdown.</p>
+<h1>{{ paper.title }}</h1>
+<p class="lead">{{ paper.lead }}</p>
 <div class="counts">
 {% for verdict, count in counts.items() %}
 <div class="count {{ verdict }}"><b>{{ count }}</b>{{ words[verdict] }}</div>
@@ -70,22 +68,21 @@ acquired until touchdown.</p>
 </table>
 </div>
 
-<h2>The figures, redrawn with our flights</h2>
-<p class="lead">The paper's own curves are not at hand as data. Its claimed figures are the dashed green lines.</p>
+<h2>The figures, redrawn with ours</h2>
+<p class="lead">{{ paper.figures_lead }}</p>
 {% for figure in figures %}
-<figure class="card" id="figure-{{ figure.number }}">
-<h3>{{ figure.title }} <span>· {{ "section" if figure.number == "7.1" else "figure" }} {{ figure.number }}</span></h3>
+<figure class="card" id="{{ figure.anchor }}">
+<h3>{{ figure.title }} <span>· {{ figure.place }}</span></h3>
 {{ figure.svg | safe }}
 <figcaption>{{ figure.caption }}</figcaption>
 </figure>
 {% endfor %}
 
-<h2>Flights</h2>
-<p class="lead">Each can be flown again, to the same bits, with
-<code>landing-sim run SCENARIO --set … --seed N</code>; the scripted pilot's are flown by this report only.</p>
+<h2>{{ paper.runs_title }}</h2>
+<p class="lead">{{ paper.runs_lead }}</p>
 <div class="card scroll">
 <table>
-<tr><th>scenario</th><th>changes</th><th>seeds</th></tr>
+<tr><th>what</th><th>settings</th><th>seeds</th></tr>
 {% for name, changes, seeds in settings %}
 <tr><td>{{ name }}</td><td><code>{{ changes or "none" }}</code></td><td>{{ seeds }}</td></tr>
 {% endfor %}

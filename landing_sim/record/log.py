@@ -227,7 +227,7 @@ class LogBuilder:
             "schema": SCHEMA,
             "scenario": dict(scenario or {}),
             "seed": seed,
-            "versions": _versions(),
+            "versions": versions(),
             "touchdown": None if touchdown is None else {f: float(getattr(touchdown, f)) for f in Touchdown.__slots__},
             "end": end,
             **{f"runway_{key}": float(value) for key, value in runway.items()},
@@ -297,7 +297,7 @@ def _with_unit(name: str) -> str:
 
 
 @functools.cache
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
     """Of the packages whose numbers the results depend on."""
     packages = ("landing-sim", "jsbsim", "numpy", "scipy", "numba", "opencv-python-headless", "control")
     found = {}

@@ -6,8 +6,8 @@
 so that z = y3_hat - y3 obeys z' = -r3 z - b3 (y3_hat^2 - y3^2) - lambda |d|^2 z.
 
 Reconstruction: only its abstract could be read; structure and error dynamics follow from it and from the equations of
-motion, nine parts in ten sure. Gibert's "lambda = 30 is as fast as omega = 7" comes out (0.61 and 0.56 s), which confirms the
-gain. Noise in y reaches y3_hat directly through beta: that is the structure's, and 1/y3_hat makes spikes of it.
+motion, nine parts in ten sure. Gibert's "lambda = 30 is as fast as omega = 7" comes out (0.61 and 0.56 s), which confirms
+the gain. Noise in y reaches y3_hat directly through beta: that is the structure's, and 1/y3_hat makes spikes of it.
 """
 
 from __future__ import annotations

@@ -5,53 +5,20 @@ The paper's curves are not at hand as data: its claimed figures are drawn as ref
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from landing_sim.papers import dickmanns_1992 as paper
 from landing_sim.papers import measures as m
-from landing_sim.papers.claims import Flown, Run
+from landing_sim.papers.drawing import BAND, CLAIM, ESTIMATED, OTHER, TRUE, Figure, svg
+from landing_sim.papers.flights import Flown, Run
 from landing_sim.record.judge import counted
 from landing_sim.record.log import FlightLog
 from landing_sim.types import Array
 
-TRUE, ESTIMATED, OTHER, CLAIM, BAND = "#2a6f97", "#e76f51", "#8d99ae", "#6a994e", "#e76f5133"
-STYLE = {
-    "figure.figsize": (9.2, 3.2),
-    "font.size": 9.5,
-    "font.family": "sans-serif",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": "#5c677d",
-    "axes.labelcolor": "#33415c",
-    "axes.titlesize": 10,
-    "axes.titlelocation": "left",
-    "axes.grid": True,
-    "grid.color": "#e3e7ee",
-    "xtick.color": "#5c677d",
-    "ytick.color": "#5c677d",
-    "lines.linewidth": 1.5,
-    "legend.edgecolor": "none",
-    "legend.framealpha": 0.85,
-    "legend.fontsize": 8.5,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "landing-sim",
-}
 DISTANCE = "distance to the threshold x [m]"
-
-
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """One of the paper's figures, redrawn."""
-
-    number: str
-    title: str
-    svg: str
-    caption: str
 
 
 def figures(flown: Mapping[Run, Flown]) -> list[Figure]:
@@ -95,7 +62,7 @@ def _trajectory(log: FlightLog) -> Figure:
         "The offset of 85 m is flown off in one turn to the runway and back; the glide of about 3 degrees rounds out "
         "exponentially. Green: where the paper begins its flare and touches down."
     )
-    return Figure("8", "Trajectory", _svg(draw, 2), caption)
+    return Figure("figure 8", "Trajectory", svg(draw, 2), caption)
 
 
 def _angle(
@@ -123,7 +90,7 @@ def _angle(
         f"Largest difference {largest:.2g} {unit} where the paper stays within {claim:g} {unit}; the band is the filter's "
         "own 3-sigma."
     )
-    return Figure(number, title, _svg(draw, 2), caption)
+    return Figure(f"figure {number}", title, svg(draw, 2), caption)
 
 
 def _lateral(gust: FlightLog, split: FlightLog) -> Figure:
@@ -149,7 +116,7 @@ def _lateral(gust: FlightLog, split: FlightLog) -> Figure:
         f"In the gust the paper's error grew to about 3 m. A filter of its kind gives {theirs:.2g} m here, one that "
         f"estimates the wind {ours:.2g} m."
     )
-    return Figure("11", "Lateral offset", _svg(draw, 2), caption)
+    return Figure("figure 11", "Lateral offset", svg(draw, 2), caption)
 
 
 def _range_and_height(gust: FlightLog, flown: Mapping[Run, Flown]) -> Figure:
@@ -179,7 +146,7 @@ def _range_and_height(gust: FlightLog, flown: Mapping[Run, Flown]) -> Figure:
         "Text of section 7.1, drawn: range within 5 m until the threshold is lost, then only predicted (the band opens). "
         "On the right a platform lag that the filter does not know of: at flare onset it shows in pitch, not in height."
     )
-    return Figure("7.1", "Range and height errors", _svg(draw, 2), caption)
+    return Figure("section 7.1", "Range and height errors", svg(draw, 2), caption)
 
 
 def _against_gps(log: FlightLog, number: str, title: str, name: str, column: str) -> Figure:
@@ -203,7 +170,7 @@ def _against_gps(log: FlightLog, number: str, title: str, name: str, column: str
         "A scripted pilot flies in light turbulence; the filter only watches. What lies between the two curves on the "
         "right is the GPS' own error, which a real flight cannot show."
     )
-    return Figure(number, title, _svg(draw, 2), caption)
+    return Figure(f"figure {number}", title, svg(draw, 2), caption)
 
 
 def _altitude(log: FlightLog) -> Figure:
@@ -223,7 +190,7 @@ def _altitude(log: FlightLog) -> Figure:
         both.legend()
 
     caption = "As in the paper, GPS is the worst of the three in altitude, and the radar altimeter is the judge."
-    return Figure("14", "Altitude, flown by hand", _svg(draw, 2), caption)
+    return Figure("figure 14", "Altitude, flown by hand", svg(draw, 2), caption)
 
 
 def _width(logs: list[FlightLog]) -> Figure:
@@ -242,7 +209,7 @@ def _width(logs: list[FlightLog]) -> Figure:
     caption = (
         "The separate width filter, started 4 m off either way, on the approaches flown by hand; the band is 3-sigma."
     )
-    return Figure("15", "Estimated runway width", _svg(draw, 1), caption)
+    return Figure("figure 15", "Estimated runway width", svg(draw, 1), caption)
 
 
 def _errors(axes: Any, x: Array, error: Array, sigma: Array, claim: float, unit: str) -> None:
@@ -266,19 +233,3 @@ def _errors(axes: Any, x: Array, error: Array, sigma: Array, claim: float, unit:
 def _end(log: FlightLog) -> float:
     touchdown = log.touchdown
     return float(log["true_x_m"].max()) if touchdown is None else touchdown.x
-
-
-def _svg(draw: Callable[[Any], None], columns: int) -> str:
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    out = io.StringIO()
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(1, columns, layout="constrained")
-        draw(axes)
-        figure.savefig(out, format="svg", facecolor="white", metadata={"Date": None, "Creator": None})
-        plt.close(figure)
-    text = out.getvalue()
-    return text[text.index("<svg") :]
