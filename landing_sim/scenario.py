@@ -53,7 +53,7 @@ class Initial(Section):
     y_m: float = Field(-85.0, ge=-5000, le=5000, description="cg right of the centreline")
     height_m: float = Field(51.0, gt=0, le=3000, description="cg above the threshold")
     heading_deg: float = Field(15.0, gt=-180, le=180, description="nose right (+) of the landing direction")
-    airspeed_mps: Positive = Field(50.0, description="true airspeed")
+    airspeed_mps: Positive | None = Field(50.0, description="true airspeed; null = the vehicle's approach speed")
     flight_path_deg: float = Field(-3.0, ge=-15, le=15, description="air-relative flight path angle, climb positive")
 
 

@@ -148,6 +148,12 @@ def _air_density(scenario: Scenario) -> float:
     return 1.225 * (1.0 - 0.0065 * height / 288.15) ** 4.2559
 
 
+def prepared(scenario: Scenario, vehicle: Vehicle) -> Vehicle:
+    """The vehicle for this approach: a crew knows its mass and the steady headwind."""
+    mass = vehicle.mass_kg if scenario.aircraft.mass_kg is None else scenario.aircraft.mass_kg
+    return vehicle.prepared(mass, scenario.wind.headwind_mps, _air_density(scenario))
+
+
 def control_settings(scenario: Scenario, vehicle: Vehicle) -> ControlSettings:
     c, rho, flap = vehicle.control, scenario.control.rho, scenario.aircraft.flap
     axes = {name: replace(getattr(c, name), rho=rho) for name in ("longitudinal", "lateral")}

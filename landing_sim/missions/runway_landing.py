@@ -118,6 +118,7 @@ def build(scenario: Scenario, vehicle: Vehicle, seed: int, run: int = 0) -> Miss
     def noise(name: str) -> Noise:
         return Noise(seed, name, run)
 
+    vehicle = onboard.prepared(scenario, vehicle)
     clock = loop.Clock.of(scenario.time.step_s, scenario.time.cycle_s, scenario.control.delay_s)
     wind = truth.wind(scenario, noise("turbulence"))
     platform = truth.platform(scenario, vehicle, noise("operator"))

@@ -76,6 +76,7 @@ def platform(scenario: Scenario, vehicle: Vehicle, noise: Noise) -> PanTilt | St
 
 def plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt | Strapdown, wind: Wind) -> JsbsimPlant:
     a, s, r = scenario.aircraft, scenario.initial, scenario.runway
+    airspeed = vehicle.guidance.path.approach_mps if s.airspeed_mps is None else s.airspeed_mps
     frame = RunwayFrame(
         math.radians(r.latitude_deg), math.radians(r.longitude_deg), r.elevation_m, math.radians(r.heading_deg)
     )
@@ -84,7 +85,7 @@ def plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt | Strapdown, w
         y=s.y_m,
         height=s.height_m,
         psi=math.radians(s.heading_deg),
-        airspeed=s.airspeed_mps,
+        airspeed=airspeed,
         gamma=math.radians(s.flight_path_deg),
         flap=vehicle.control.flap if a.flap is None else a.flap,
         mass=a.mass_kg,
@@ -96,7 +97,7 @@ def plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt | Strapdown, w
         initial,
         math.atan(r.slope_percent / 100.0),
         scenario.time.step_s,
-        wind.wind(0.0, s.x_m, s.height_m, s.airspeed_mps),
+        wind.wind(0.0, s.x_m, s.height_m, airspeed),
         platform,
         np.array(vehicle.camera.p_BC_m),
     )
