@@ -303,6 +303,11 @@ Metric = Literal[
     "rollout_y_m",
     "final_groundspeed_mps",
     "threshold_lost_m",
+    "range_1km_percent",
+    "threshold_lateral_error_m",
+    "threshold_height_error_m",
+    "threshold_y_m",
+    "threshold_above_m",
     "nees",
     "nis",
 ]

@@ -138,6 +138,7 @@ def by_hand(**columns) -> FlightLog:
     base |= {f"true_wheel_{w}_m": base["true_H_m"] for w in ("left", "right", "third")}
     base |= {"true_groundspeed_mps": np.linspace(80.0, 2.0, n), "nees": zero + 9.0, "nees_dof": np.full(n, 9)}
     base |= {"nis": zero + 8.0, "nis_dof": np.full(n, 10)}
+    base |= {"ref_height_m": base["true_H_m"].copy(), "ref_climb_rate_mps": -0.05 * base["true_groundspeed_mps"]}
     down = {"t": 8.75, "x": 101.0, "y": 0.4, "sink_rate": 0.5, "airspeed": 43.0, "groundspeed": 44.0, "pitch": 0.1}
     meta = {"touchdown": down | {"bank": 0.0, "heading_error": 0.0, "sideslip": 0.0}, "seed": 3, "end": "stopped"}
     return FlightLog(base | columns, meta | {"runway_width_m": 29.0, "runway_length_m": 1680.0})
@@ -204,6 +205,21 @@ def test_estimates_are_compared_with_the_truth_of_their_own_time():
 def test_airspeed_of_a_filter_with_wind_states():
     headwind = by_hand(est_wx_mps=np.full(101, -5.0), est_wy_mps=np.zeros(101), est_wz_mps=np.zeros(101))
     assert judge.errors(headwind)["airspeed"]["max"] == pytest.approx(5.0)
+
+
+def test_over_the_threshold_by_hand():
+    """x = 0 at 7.5 s. Believed 4 m further on, the path looks 0.2 m lower than it is where the aircraft really is."""
+    log = by_hand()
+    off = {"est_x_m": log["true_x_m"] + 4.0, "est_y_m": log["true_y_m"] - 0.5, "est_H_m": log["true_H_m"] + 0.3}
+    flown = {"true_y_m": log["true_y_m"] + 0.7, "ref_height_m": log["true_H_m"] - 1.2}
+    found = judge.at_threshold(by_hand(**off, **flown))
+    assert found["threshold_lateral_error_m"] == pytest.approx(1.2)
+    assert found["threshold_height_error_m"] == pytest.approx(0.3)
+    assert found["threshold_y_m"] == pytest.approx(0.7)
+    assert found["threshold_above_m"] == pytest.approx(1.0)
+    assert math.isnan(found["range_1km_percent"])  # it began nearer
+    further = judge.at_threshold(by_hand(true_x_m=log["true_x_m"] - 600.0, est_x_m=log["true_x_m"] - 612.0))
+    assert further["range_1km_percent"] == pytest.approx(1.2)
 
 
 def with_touchdown(**changes) -> FlightLog:

@@ -162,6 +162,7 @@ def measure(log: FlightLog) -> dict[str, float]:
         "rollout_y_m": float(np.abs(log["true_y_m"][rolled]).max()) if rolled.any() else nan,
         "final_groundspeed_mps": nan if touchdown is None else float(log["true_groundspeed_mps"][-1]),
         "threshold_lost_m": _threshold_lost(log),
+        **at_threshold(log),
         **{name: value for name, value in consistency(log).items() if name in ("nees", "nis")},
     }
     return metrics
@@ -272,6 +273,30 @@ def captured_after(log: FlightLog, below: float) -> float:
     if len(off) == 0:
         return 0.0
     return float(x[off[-1] + 1] - x[0]) if off[-1] + 1 < len(x) else math.nan
+
+
+def at_threshold(log: FlightLog) -> dict[str, float]:
+    """The estimate's errors and what was flown where a system is handed over: over the threshold, and 1 km before it.
+
+    "threshold_y_m", "threshold_above_m": of the cg against the centreline and against the path that guidance asked for.
+    """
+    airborne = ~_after_touchdown(log) & log["valid"]
+    x = log["true_x_m"][airborne]
+
+    def at(where: float, values: Array) -> float:
+        inside = len(x) > 1 and x[0] <= where <= x[-1]
+        return float(np.interp(where, x, values[airborne])) if inside else math.nan
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = log["ref_climb_rate_mps"] / log["true_groundspeed_mps"]
+    wanted = log["ref_height_m"] - slope * log.error("x")
+    return {
+        "range_1km_percent": abs(at(-1000.0, log.error("x"))) / 10.0,
+        "threshold_lateral_error_m": abs(at(0.0, log.error("y"))),
+        "threshold_height_error_m": abs(at(0.0, log.error("H"))),
+        "threshold_y_m": at(0.0, log["true_y_m"]),
+        "threshold_above_m": at(0.0, log["true_H_m"] - wanted),
+    }
 
 
 def _after_touchdown(log: FlightLog) -> np.ndarray:
