@@ -291,9 +291,9 @@ def at_threshold(log: FlightLog) -> dict[str, float]:
         slope = log["ref_climb_rate_mps"] / log["true_groundspeed_mps"]
     wanted = log["ref_height_m"] - slope * log.error("x")
     return {
-        "range_1km_percent": abs(at(-1000.0, log.error("x"))) / 10.0,
-        "threshold_lateral_error_m": abs(at(0.0, log.error("y"))),
-        "threshold_height_error_m": abs(at(0.0, log.error("H"))),
+        "range_1km_percent": at(-1000.0, np.abs(log.error("x")) / 10.0),
+        "threshold_lateral_error_m": at(0.0, np.abs(log.error("y"))),
+        "threshold_height_error_m": at(0.0, np.abs(log.error("H"))),
         "threshold_y_m": at(0.0, log["true_y_m"]),
         "threshold_above_m": at(0.0, log["true_H_m"] - wanted),
     }
