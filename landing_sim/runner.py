@@ -109,6 +109,7 @@ def scene(scenario: Scenario, vehicle: Vehicle) -> Scene:
         span=vehicle.size.span_m,
         fuselage=vehicle.size.length_m,
         markings=runway.markings,
+        ranged=scenario.filter.kind == "observer",
         start=(start.x_m, start.y_m, -start.height_m),
         title=f"{scenario.name}, seed {scenario.seed}",
     )

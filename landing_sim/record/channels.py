@@ -54,6 +54,19 @@ SERIES = (  # entity, title, ((column, name, factor), ...)
     ("flight/throttle", "throttle, brakes", (("cmd_throttle", "throttle", 1.0), ("cmd_brake_left", "brake", 1.0))),
     ("flight/nis", "innovation: NIS per measurement", (("nis_ratio", "NIS", 1.0),)),
 )
+RANGING = (  # where the runway's size is not known
+    (
+        "ranging/error",
+        "range: error and believed spread [%]",
+        (("range_error", "error", 100.0), ("est_spread", "+ 1 sigma", 100.0), ("est_spread", "- 1 sigma", -100.0)),
+    ),
+    ("ranging/width", "width of the runway [m]", (("est_W_m", "believed", 1.0), ("true_W_m", "true", 1.0))),
+    (
+        "ranging/observability",
+        "observability: d [m/s], how fast nearness shows in the image",
+        (("est_d1", "across", 1.0), ("est_d2", "down", 1.0), ("est_dW", "width", 1.0)),
+    ),
+)
 MODE_COLOURS = {
     "acquire": 0x8D99AEFF,
     "hold": 0xB5A7D6FF,

@@ -9,7 +9,7 @@ import numpy as np
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.geometry.runway_image import image_line, plane_normal
 from landing_sim.geometry.so3 import camera_from_body, from_euler
-from landing_sim.signals import CameraSample, EdgeSet, Estimate, Feature, Status
+from landing_sim.signals import CameraSample, EdgeSet, Estimate, Feature, Sample, Status
 from landing_sim.types import Array
 
 NEAR = 2.0  # [m] in front of the camera, where edges are cut off
@@ -101,9 +101,9 @@ def window_boxes(edges: EdgeSet, half_search: float = 20.0, half_width: float = 
     )
 
 
-def camera_sample(samples: tuple) -> CameraSample | None:
-    """The image among a cycle's samples, if there is one."""
-    return next((sample.data for sample in samples if isinstance(sample.data, CameraSample)), None)
+def camera_sample(samples: tuple[Sample, ...]) -> tuple[float, CameraSample] | None:
+    """The image among a cycle's samples, if there is one, and when it was exposed [s]."""
+    return next(((sample.t_valid, sample.data) for sample in samples if isinstance(sample.data, CameraSample)), None)
 
 
 def _into_image(a: Array, b: Array, k: Intrinsics) -> Array | None:

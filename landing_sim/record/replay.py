@@ -7,6 +7,7 @@ Positions are in R, local to the threshold: the viewer's float32 would lose them
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,10 +16,10 @@ import numpy as np
 
 from landing_sim.geometry.so3 import camera_from_body, from_euler
 from landing_sim.record import overlay, shapes
-from landing_sim.record.channels import ERRORS, MODE_COLOURS, SERIES, SPANS, events
+from landing_sim.record.channels import ERRORS, MODE_COLOURS, RANGING, SERIES, SPANS, events
 from landing_sim.record.log import FlightLog
 from landing_sim.record.viewer import ReplayError, open_viewer, start_live_viewer
-from landing_sim.signals import Feature, Status, Step
+from landing_sim.signals import Estimate, Feature, Status, Step
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -44,6 +45,7 @@ class Scene:
     markings: bool = True
     title: str = "landing-sim"
     start: tuple[float, float, float] = (-950.0, -85.0, -51.0)  # [m] p_RB at t = 0: where the watching eye begins
+    ranged: bool = False  # the runway's size is not known on board
 
 
 class Recorder:
@@ -64,6 +66,7 @@ class Recorder:
         self._period = 1.0 / frames_hz if frames_hz > 0.0 else np.inf
         self._next_frame = -np.inf
         self._live = live
+        self._past: deque[Estimate] = deque(maxlen=64)
         self._stream = rr.RecordingStream("landing-sim", recording_id=path.stem)
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
@@ -81,15 +84,18 @@ class Recorder:
 
     def add(self, step: Step) -> None:
         """The camera image of this step, if it is time for one, with what was seen in it."""
-        sample = overlay.camera_sample(step.samples)
-        if sample is None or step.truth.t < self._next_frame - 1e-9:
+        self._past.append(step.estimate)
+        image = overlay.camera_sample(step.samples)
+        if image is None or step.truth.t < self._next_frame - 1e-9:
             return
+        exposed, sample = image
         self._next_frame = step.truth.t + self._period
         rr, stream = _rerun(), self._stream
         stream.set_time(TIMELINE, duration=step.truth.t)
         stream.log(IMAGE, rr.EncodedImage(contents=_jpeg(sample.frame.full()), media_type="image/jpeg"))
-        if step.estimate.valid:
-            lines = overlay.predicted_edges(step.estimate, sample.pan, sample.tilt, self._scene.camera)
+        then = min(self._past, key=lambda estimate: abs(estimate.t - exposed))  # an image may be old when it arrives
+        if then.valid:
+            lines = overlay.predicted_edges(then, sample.pan, sample.tilt, self._scene.camera)
             colours = [overlay.FEATURE_COLOURS[Feature(f)] for f in lines.feature]
             stream.log(f"{IMAGE}/predicted", rr.LineStrips2D(lines.ends, colors=colours, radii=0.8, draw_order=10.0))
         edges = next((m for m in step.measurements if m.geometry is not None), None)
@@ -163,7 +169,7 @@ class Recorder:
                 colors=[ESTIMATE_COLOUR, BAND_COLOUR, BAND_COLOUR], names=names, widths=[2.0, 1.0, 1.0]
             )
             stream.log(entity, style, static=True)
-        for entity, _, series in SERIES:
+        for entity, _, series in SERIES + RANGING * scene.ranged:
             stream.log(entity, rr.SeriesLines(names=[name for _, name, _ in series]), static=True)
         labels = list(MODE_COLOURS)
         modes = rr.StateConfiguration(values=labels, labels=labels, colors=[MODE_COLOURS[m] for m in labels])
@@ -205,8 +211,10 @@ def record_log(stream: rr.RecordingStream, log: FlightLog) -> None:
             band = np.column_stack([error, 3.0 * sigma, -3.0 * sigma])[use]
             stream.send_columns(entity, times(use), rr.Scalars.columns(scalars=band))
     nis_ratio = np.where(log["nis_dof"] > 0, log["nis"] / np.maximum(log["nis_dof"], 1), np.nan)
-    derived = {"nis_ratio": nis_ratio}
-    for entity, _, series in SERIES:
+    derived = {"nis_ratio": nis_ratio, "true_W_m": log.truth("W")}
+    if "est_spread" in log:
+        derived["range_error"] = log.error("x") / np.minimum(log.truth("x"), -30.0)
+    for entity, _, series in SERIES + RANGING * ("est_spread" in log):
         values = np.column_stack([factor * (derived[c] if c in derived else log[c]) for c, _, factor in series])
         some = np.isfinite(values).any(axis=1)
         if some.any():
@@ -248,6 +256,7 @@ def _blueprint(scene: Scene) -> Any:
         *(plot(e, title, SPANS.get(e)) for e, _, title, _ in ERRORS), grid_columns=4, name="errors and 3 sigma"
     )
     flight = rrb.Grid(*(plot(e, title) for e, title, _ in SERIES), grid_columns=4, name="flight and commands")
+    ranging = rrb.Horizontal(*(plot(e, title) for e, title, _ in RANGING), name="range of an unknown runway")
     phases = rrb.Vertical(
         rrb.StateTimelineView(origin="flight/phase", name="phase"),
         rrb.TextLogView(origin="flight/events", name="events"),
@@ -256,7 +265,7 @@ def _blueprint(scene: Scene) -> Any:
     return rrb.Blueprint(
         rrb.Vertical(
             rrb.Horizontal(chase, image, column_shares=[3, 2]),
-            rrb.Tabs(errors, flight, phases, active_tab=0),
+            rrb.Tabs(*([ranging] * scene.ranged), errors, flight, phases, active_tab=0),
             row_shares=[3, 2],
         ),
         rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing", loop_mode="all"),
