@@ -271,6 +271,7 @@ def test_what_was_not_measured_is_carried_by_the_motion(observer):
     y[150:200] = math.nan
     found = observe(observer, x, y, [steady_motion(A, B, 0.01)] * 300, 0.01, 1.0)
     assert np.isfinite(found.x_hat).all()
+    assert (found.flag[150:200] == Flag.UNOBSERVABLE).all()
     assert np.abs(found.relative[150:200]).max() < 0.01
     assert abs(found.relative[-1]) < 0.01
 
@@ -301,9 +302,11 @@ def test_passing_d1_zero(observer):
     assert (found.flag[1:] == Flag.GOOD).any()
 
 
-def test_a_sign_that_changed_between_two_samples_is_seen():
+@pytest.mark.parametrize(
+    "observer", [GibertDiscrete(HighGain(lambda1=50.0, lambda2=50.0)), Dahl(omega=0.1)], ids=["gibert", "dahl"]
+)
+def test_a_sign_that_changed_between_two_samples_is_seen(observer):
     x = course(1.0, 12.0)[8:]  # d1 is 0.42 at 8 s, 0.22 at 9 s, -0.19 at 10 s: never small
-    observer = GibertDiscrete(HighGain(lambda1=50.0, lambda2=50.0), floor=0.05)
     found = observe(observer, x, x[:, :2] / x[:, 2:], [steady_motion(A, B, 1.0)] * 4, 1.0, float(x[0, 2]))
     assert np.abs(found.d[1:, 0]).min() > 0.05
     assert found.flag[1] == Flag.GOOD and found.flag[2] == Flag.UNOBSERVABLE
@@ -440,6 +443,19 @@ def test_an_ekf_says_how_sure_it_is():
             state = observer.step(state, measured, motion, approach.PERIOD)
         ratios.append((state.x[2] - x[-1, 2]) / observer.sigmas(state)[2])
     assert 0.4 < np.sqrt(np.mean(np.square(ratios))) < 1.8
+
+
+def test_an_ekf_s_update_is_that_of_information():
+    observer, still = RangeEkf(sigma=(1e-3, 2e-3, 3e-3), drift=0.0), steady_motion(np.zeros((3, 3)), np.zeros(3), 1.0)
+    y = np.array([0.1, -0.05, 0.015])
+    before = observer.start(y, 1000.0)
+    P = before.inner[1:].reshape(4, 4)
+    H = np.array([[1e-3, 0, -1e-4, 0], [0, 1e-3, 5e-5, 0], [0, 0, -1.5e-5, 1e-3]])
+    after = observer.step(before, y, still, 1.0)
+    P = P + 1e-9 * np.eye(4)  # the start is certain across the ray to the last digit
+    wanted = np.linalg.inv(np.linalg.inv(P) + H.T @ np.diag(1.0 / np.square(observer.sigma)) @ H)
+    np.testing.assert_allclose(after.inner[1:].reshape(4, 4), wanted, rtol=1e-4, atol=1e-6 * np.abs(wanted).max())
+    assert observer.sigmas(after) == pytest.approx(np.sqrt(np.diag(wanted)), rel=1e-4)
 
 
 def test_an_ekf_starts_when_all_is_measured():

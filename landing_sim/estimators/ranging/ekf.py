@@ -69,7 +69,7 @@ class RangeEkf:
             x = x + K @ e
             joseph = np.eye(n) - K @ H
             P = joseph @ P @ joseph.T + K @ R @ K.T
-        seen = speed >= self.floor
+        seen = speed >= self.floor and bool(np.isfinite(y).any())
         return arrive(state, x[:3], y, motion, _pack(x[3:], P), (float(d[0]), float(d[1])), seen, self.limit)
 
     def estimate(self, state: State) -> Array:
