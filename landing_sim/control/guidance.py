@@ -34,7 +34,8 @@ class GuidanceMemory:
     waiting: float = 0.0  # [s] for how long touchdown or instability has been suspected
     bounced: bool = False  # airborne again after touchdown
     blind: float = 0.0  # [s] looked for the runway in vain
-    start: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of a go-around: time [s], height [m], climb rate [m/s]
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of a go-around: time [s], height [m], climb rate [m/s]; of a
+    # second flare: time, wheel height
     heading: float = 0.0  # [rad] held while the range is not known
 
 
@@ -153,6 +154,8 @@ class LandingGuidance:
         crosswind = memory.crosswind + share * (b.wy - memory.crosswind)
         downdraught = memory.downdraught + share * (b.wz - memory.downdraught)
         started = mode == "go_around" and (memory.mode != mode or not math.isfinite(memory.seen))
+        bounced = memory.mode == "rollout" and mode == "decrab"
+        start = (estimate.t, b.H, m.H_dot) if started else (estimate.t, wheels[0], 0.0) if bounced else memory.start
         memory = GuidanceMemory(
             mode,
             estimate.t,
@@ -160,9 +163,9 @@ class LandingGuidance:
             crosswind,
             downdraught,
             waiting,
-            memory.bounced or (memory.mode == "rollout" and mode == "decrab"),
+            memory.bounced or bounced,
             memory.blind,
-            (estimate.t, b.H, m.H_dot) if started else memory.start,
+            start,
             b.psi if mode == "hold" and memory.mode != mode else memory.heading,
         )
         if mode == "rollout" or mode == "stopped":
@@ -181,9 +184,12 @@ class LandingGuidance:
         H_path, slope, curvature = path.height(wheel_x)
         over_path = height + path.surface(wheel_x) - H_path
         V, V_slope = path.speed(wheel_x)
-        if memory.bounced:  # down again from where it is, as steeply as the flare is there
-            falling = max(height, 0.0) + path.sink_height
-            over_path, slope, curvature = 0.0, path.rise - falling / path.length, falling / path.length**2
+        if memory.bounced:  # a flare from where it came off the ground, over time
+            t0, height0, _ = memory.start
+            falling = max(height0, 0.0) + path.sink_height
+            falling *= math.exp(-(memory.t - t0) * max(m.x_dot, 0.0) / path.length)
+            over_path = height - (falling - path.sink_height)
+            slope, curvature = path.rise - falling / path.length, falling / path.length**2
             V, V_slope = path.touchdown, 0.0
         limit = s.path.height_error_limit_m
         error = min(max(-over_path, -limit), limit)
