@@ -16,13 +16,15 @@ from typing import Literal
 
 import numpy as np
 
-from landing_sim.estimators.lines import RunwayLines, runway_lines
+from landing_sim.estimators.lines import RunwayLines, runway_lines, threshold_direction
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.geometry.runway_image import horizon_dip
 from landing_sim.geometry.so3 import camera_from_body, from_euler, to_euler
 from landing_sim.geometry.vanishing import down_from_level_line, heading_from_point, heading_variance, roll_and_pitch
-from landing_sim.signals import EdgeSet
+from landing_sim.signals import EdgeSet, Feature, Status
 from landing_sim.types import Array
+
+LEVEL_SIGMA = 2e-3  # [rad] of the roll that is believed
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +54,8 @@ def bearings(
     R_RB (3, 3): attitude as believed; camera_error [rad]: of the pan and tilt read; height [m] of the camera, for the dip.
     "horizon" takes roll and pitch from the image, where it shows the horizon, and "inertial" from R_RB.
     """
-    lines = runway_lines(z, R, edges, lens, horizon_dip(height))
     R_CB = camera_from_body(edges.pan - camera_error[0], edges.tilt - camera_error[1])
+    lines = runway_lines(z, R, edges, lens, horizon_dip(height), None, _level_threshold(edges, R_CB @ R_RB.T, lens))
     if attitude == "horizon" and lines.horizon is not None:
         phi, theta = roll_and_pitch(down_from_level_line(lines.horizon.homogeneous, lens), R_CB)
         R_RB = from_euler(phi, theta, to_euler(R_RB)[2])
@@ -64,6 +66,14 @@ def bearings(
         heading, rise = heading_from_point(point.uv[0], R_RC, lens)
         turned = heading, heading_variance(point.uv[0], point.cov, R_RC, lens), rise
     return Bearings(turned, _threshold(lines, R_RC, lens), _borders(lines, R_RC, lens), used)
+
+
+def _level_threshold(edges: EdgeSet, R_CR: Array, lens: Intrinsics) -> tuple[Array, float] | None:
+    """The direction that a level threshold across the runway must have, where few windows are on it."""
+    on_it = (edges.feature == Feature.THRESHOLD) & (edges.status == Status.FOUND)
+    if not on_it.any():
+        return None
+    return threshold_direction(edges.centre[on_it].mean(axis=0), R_CR, 0.0, lens), LEVEL_SIGMA
 
 
 def _ray(R_RC: Array, uv: Array, lens: Intrinsics) -> Array:

@@ -29,6 +29,7 @@ from landing_sim.estimators.observer.scene import Carriage, Scene
 from landing_sim.estimators.ranging.fused import correct, faded
 from landing_sim.estimators.ranging.gains import pole_pair
 from landing_sim.geometry.pinhole import Intrinsics
+from landing_sim.geometry.so3 import from_euler
 from landing_sim.types import Array
 
 RAD = math.pi / 180.0
@@ -67,6 +68,10 @@ class Gibert:
         self._common = np.array([config.bearing_floor**2, config.bearing_floor**2, 0.0])
 
     def start(self, s: Array, P: Array, t: float) -> Scene:
+        """The course is the camera's: what its mounting turns it by, this observer cannot tell from the runway's."""
+        P = np.diag(np.diag(P))
+        P[sc.COURSE, sc.COURSE] -= P[sc.EPAN, sc.EPAN]
+        P[sc.EPAN, sc.EPAN] = 0.0
         return Scene(s, P, self.config.first_spread, t)
 
     def move(self, scene: Scene, way_R: Array, dt: float) -> Scene:
@@ -86,9 +91,8 @@ class Gibert:
         if m.geometry is None:
             raise ValueError("a measurement of kind 'edges' needs its EdgeSet")
         ahead = np.array([-s[sc.X], -s[sc.Y], s[sc.H]])  # from the camera to the threshold's middle, R
-        seen = bearings(
-            m.z, m.R, m.geometry, self._lens, carried.R_RB, (s[sc.EPAN], s[sc.ETILT]), float(ahead[2]), c.attitude
-        )
+        R_RB = carried.R_RB if s[sc.EROLL] == 0.0 else carried.R_RB @ from_euler(s[sc.EROLL], 0.0, 0.0)
+        seen = bearings(m.z, m.R, m.geometry, self._lens, R_RB, (s[sc.EPAN], s[sc.ETILT]), float(ahead[2]), c.attitude)
         if seen.turned is None and seen.borders is None and seen.threshold is None:
             return replace(scene, misses=scene.misses + 1, threshold_in_view=False)
         s, P = s.copy(), scene.P.copy()

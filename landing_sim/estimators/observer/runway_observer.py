@@ -163,13 +163,15 @@ class RunwayObserver:
         s[[sc.X, sc.Y, sc.H]] = factor * camera
         s[sc.WIDTH] = factor * self._nominal
         s[sc.COURSE] = wrap(z[2] - m.z[5])
-        P = np.zeros((sc.N, sc.N))
-        rows = [sc.X, sc.Y, sc.H]
-        P[np.ix_(rows, rows)] = factor**2 * m.R[:3, :3]
-        for error in (sc.EPAN, sc.ETILT, sc.EROLL):
-            P[error, error] = c.camera_sigma**2
-        # the acquired heading is the camera's: an error of its mounting is in the course as well
-        P[sc.COURSE, sc.COURSE] = m.R[5, 5] + c.camera_sigma**2
+        # acquired attitudes are the camera's: how they differ from the inertial unit's is an error of the mounting
+        phi, theta, _ = to_euler(carriage(z, s).R_RB)
+        s[sc.EROLL], s[sc.ETILT] = m.z[3] - phi, theta - m.z[4]
+        L = np.zeros((sc.N, 6))
+        L[sc.X, 0] = L[sc.Y, 1] = L[sc.H, 2] = factor
+        L[sc.EROLL, 3], L[sc.ETILT, 4], L[sc.COURSE, 5] = 1.0, -1.0, -1.0
+        P = L @ m.R @ L.T
+        P[sc.EPAN, sc.EPAN] = c.camera_sigma**2
+        P[sc.COURSE, sc.COURSE] += c.camera_sigma**2
         P[sc.COURSE, sc.EPAN] = P[sc.EPAN, sc.COURSE] = -(c.camera_sigma**2)
         return replace(memory, scene=self.ranging.start(s, P, memory.t))
 
