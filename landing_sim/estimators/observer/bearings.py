@@ -25,6 +25,7 @@ from landing_sim.signals import EdgeSet, Feature, Status
 from landing_sim.types import Array
 
 LEVEL_SIGMA = 2e-3  # [rad] of the roll that is believed
+SHORT = 20.0  # [px] between windows that then tell the threshold's direction worse than the roll does
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,11 +70,11 @@ def bearings(
 
 
 def _level_threshold(edges: EdgeSet, R_CR: Array, lens: Intrinsics) -> tuple[Array, float] | None:
-    """The direction that a level threshold across the runway must have, where few windows are on it."""
-    on_it = (edges.feature == Feature.THRESHOLD) & (edges.status == Status.FOUND)
-    if not on_it.any():
+    """The direction that a level threshold across the runway must have, where its windows are too close to tell."""
+    seen = edges.centre[(edges.feature == Feature.THRESHOLD) & (edges.status == Status.FOUND)]
+    if len(seen) == 0 or np.ptp(seen, axis=0).max() > SHORT:
         return None
-    return threshold_direction(edges.centre[on_it].mean(axis=0), R_CR, 0.0, lens), LEVEL_SIGMA
+    return threshold_direction(seen.mean(axis=0), R_CR, 0.0, lens), LEVEL_SIGMA
 
 
 def _ray(R_RC: Array, uv: Array, lens: Intrinsics) -> Array:
