@@ -10,10 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from landing_sim.estimators.lines import (
+    Crossings,
     ImageLine,
     LineConfig,
     crossings,
     fit_line,
+    held_to,
     runway_lines,
     threshold_direction,
 )
@@ -197,6 +199,18 @@ def test_lines_of_a_runway_are_exact(roll: float) -> None:
     R_CL = camera_from_body(0.0, 0.0) @ from_euler(phi, theta, 0.0).T
     n = threshold_direction(got.threshold.centre, R_CL, -psi, LENS)
     assert n == pytest.approx(got.threshold.n, abs=1e-9)
+
+
+def test_a_point_held_to_a_line_moves_there_by_as_much_as_it_may() -> None:
+    """By hand: 2 px above a level line, 3 px against 4 px uncertain across it and correlated along."""
+    level = ImageLine(np.array([0.0, -1.0]), np.array([5.0, 10.0]), np.diag([16.0, 0.0]), 2, 0)
+    point = Crossings(np.array([[3.0, 8.0]]), np.array([[25.0, 6.0], [6.0, 9.0]]))
+    got = held_to(point, level)
+    assert got.uv[0] == pytest.approx([3.0 + 2.0 * 6.0 / 25.0, 8.0 + 2.0 * 9.0 / 25.0])
+    assert got.cov == pytest.approx(
+        np.array([[25.0 - 36.0 / 25.0, 6.0 * 16.0 / 25.0], [6.0 * 16.0 / 25.0, 144.0 / 25.0]])
+    )
+    assert held_to(point, level, 1e6).uv == pytest.approx(point.uv)
 
 
 def test_what_is_missing_is_none() -> None:

@@ -15,7 +15,7 @@ from landing_sim.signals import CameraSample, Estimate, Feature, Sample, Status
 from landing_sim.vision import placement as col
 from landing_sim.vision.believed import BelievedCamera, RunwayMap, TaxiwayMouth, ThresholdStripes
 from landing_sim.vision.front_end import FrontEndConfig, RunwayFrontEnd
-from landing_sim.vision.masks import measure
+from landing_sim.vision.masks import measure, pulled
 from landing_sim.vision.prediction import camera_pose, jacobian
 from landing_sim.vision.windows import Scheme, SearchConfig, WindowPlanner
 from landing_sim.world.runway import Runway, Taxiway
@@ -40,13 +40,13 @@ def edge_image(angle: float, offset: float, noise: float = 0.0, seed: int = 0, c
     return np.rint(image)[None].astype(np.uint8)
 
 
-def row(angle: float, half: int = 4, search: int = 8) -> tuple[np.ndarray, np.ndarray]:
+def row(angle: float, half: int = 4, search: int = 8, arm: int = 3) -> tuple[np.ndarray, np.ndarray]:
     """One window at the centre of a 41 px image that searches upwards for an edge at `angle`."""
-    F, I = np.zeros((1, 12)), np.zeros((1, 6), dtype=np.int64)
+    F, I = np.zeros((1, 12)), np.zeros((1, 7), dtype=np.int64)
     F[0, col.ORIGIN : col.ORIGIN + 2] = 20.0
     F[0, col.STEP + 1], F[0, col.ALONG], F[0, col.ALONG + 1] = -1.0, 1.0, math.tan(angle)
     F[0, col.NORMAL_STEP] = math.cos(angle)
-    I[0, col.HALF], I[0, col.SEARCH] = half, search
+    I[0, col.HALF], I[0, col.SEARCH], I[0, col.ARM] = half, search, arm
     return F, I
 
 
@@ -75,6 +75,44 @@ def test_noise_gives_five_hundredths_and_the_variance_says_so(angle: float) -> N
         variances.append(var)
     assert np.std(errors) * math.cos(angle * RAD) < 0.055
     assert np.mean(variances) == pytest.approx(np.var(errors), rel=0.3)
+
+
+@pytest.mark.parametrize("angle", [0.0, 10.0, 40.0])
+def test_short_arms_measure_as_well(angle: float) -> None:
+    F, I = row(angle * RAD, arm=1)
+    for offset in np.linspace(-3.0, 3.0, 41):
+        z, _, status = measured(edge_image(angle * RAD, offset, contrast=120.0), F, I)
+        assert status == FOUND
+        assert abs(z + offset) < 0.02
+    errors, variances = [], []
+    for k, offset in enumerate(np.random.default_rng(1).uniform(-1.0, 1.0, 400)):
+        z, var, _ = measured(edge_image(angle * RAD, offset, 4.0, seed=k), F, I)
+        errors.append(z + offset)
+        variances.append(var)
+    assert np.mean(variances) == pytest.approx(np.var(errors), rel=0.3)
+
+
+def test_short_arms_take_the_first_edge_on_the_way_in_and_do_not_see_what_is_three_pixels_behind() -> None:
+    """Upwards lies the runway: paint, brighter than it, 3 px and then 6 px beyond its edge."""
+    border = edge_image(0.0, 1.0).astype(int)
+    near, far = (border + edge_image(0.0, k, contrast=70.0) - 90 for k in (-2.0, -5.0))
+    z = {arm: [measured(p.astype(np.uint8), *row(0.0, arm=arm))[0] for p in (near, far)] for arm in (1, 3)}
+    assert abs(z[1][0] + 1.0) < 0.25
+    assert abs(z[1][1] + 1.0) < 0.02
+    assert abs(z[3][0] + 1.0) > 1.0
+
+
+def test_how_far_stripes_pull_a_threshold() -> None:
+    """Against a picture of the three edges; by hand: nothing to pull, nothing pulled."""
+    for begin, end, bright in ((0.1, 0.57, 0.64), (0.2, 1.2, 0.64), (0.3, 2.0, 0.4), (0.2, 1.2, -0.3)):
+        picture = np.full((1, 41, 41), 90.0)
+        for at, step in ((0.0, 100.0), (begin, 100.0 * bright), (end, -100.0 * bright)):
+            picture += math.copysign(1.0, step) * (edge_image(0.0, -at, contrast=abs(step)) - 90.0)
+        z, _, _ = measured(np.rint(picture).astype(np.uint8), *row(0.0, arm=1))
+        assert pulled(begin, end, bright, 0.7) == pytest.approx(z, abs=0.02)
+        assert (z < -0.1) == (bright > 0.5)
+    assert pulled(0.3, 2.0, 0.0, 0.7) == pytest.approx(0.0, abs=1e-9)
+    assert pulled(0.5, 0.5, 0.6, 0.7) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_nothing_the_wrong_way_round_and_two_at_once_are_told_apart() -> None:

@@ -107,6 +107,19 @@ class RunwayLines:
         return None if self.left is None or self.right is None else crossings([(self.left, self.right)])
 
 
+def held_to(point: Crossings, line: ImageLine, sigma: float = 0.0) -> Crossings:
+    """One point, drawn to a line on which it is known to lie: the borders' vanishing point to the level's horizon.
+
+    sigma [px] of what else the line's place is uncertain by, as f times that of the dip (its height is only believed).
+    From the side, and where borders are short, this makes the difference: along themselves they say little.
+    """
+    uv, cov = point.uv[0], point.cov
+    a = float(line.n @ cov @ line.n)
+    gain = cov @ line.n / (a + line.sigma_at(uv) ** 2 + sigma * sigma)
+    uv = uv - gain * float(line.n @ (uv - line.centre))
+    return Crossings(uv[None], cov - np.outer(gain, line.n @ cov))
+
+
 @kernel
 def _fit(
     p: Array, s: Array, var: Array, keep: np.ndarray, prior: Array, least: float

@@ -22,7 +22,7 @@ from landing_sim.signals import CameraSample, Feature, Status
 from landing_sim.types import Array
 from landing_sim.vision.believed import BelievedCamera, RunwayMap
 from landing_sim.vision.hough import borders, depth_profile, edge_points, horizon_line
-from landing_sim.vision.placement import clean_strips
+from landing_sim.vision.placement import INNER, OUTER, clean_strips, in_metres
 from landing_sim.vision.prediction import camera_pose
 from landing_sim.vision.windows import EdgeConfig, SearchConfig, WindowPlanner
 
@@ -45,8 +45,8 @@ class AcquisitionConfig:
     max_roll: float = math.radians(30.0)
     max_heading: float = math.radians(28.0)
     min_height: float = 1.5
-    max_height: float = 300.0
-    max_range: float = 3000.0
+    max_height: float = 500.0
+    max_range: float = 10000.0
     horizon_share: float = 0.5
     min_points: float = 12.0
     min_depth_spread: float = 0.11
@@ -165,13 +165,14 @@ class Acquisition:
         slope, f = self._runway.slope, self._lens[0]
         cs, ss = math.cos(slope), math.sin(slope)
         R_CD = R_RC.T @ np.array([[cs, 0.0, ss], [0.0, 1.0, 0.0], [-ss, 0.0, cs]])  # D: along, right, down normal
-        stripes = self._runway.stripes
-        strips = clean_strips(self._runway.width, stripes.outermost, stripes.gap)
+        row = in_metres(self._runway.row(), self._runway.width)
+        strips = clean_strips(self._runway.width, row[OUTER], row[INNER])
         # clear of the stripes, and of the centre line in the middle one
         offsets = np.concatenate([s[0] + (s[1] - s[0]) * np.array([0.25, 0.35, 0.65, 0.75]) for s in strips]) - y
         scale = height * f  # pixels below the horizon, times metres
         nearest = 1.0 / max(10.0, 2.0 * height)
-        farthest = max(1.0 / self._config.max_range, (horizon_dip(height) + 8.0 / f) / height)
+        below = horizon_dip(height) + 8.0 / f + max(0.0, ss)  # of the runway's direction, to be below the horizon
+        farthest = max(1.0 / self._config.max_range, below / height)
         g = depth_profile(image, R_CD, self._lens, height, offsets, nearest, int(scale * (nearest - farthest)))
         if len(g) < 12:
             return None

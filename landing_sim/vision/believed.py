@@ -61,21 +61,54 @@ class TaxiwayMouth:
 
 
 @dataclass(frozen=True, slots=True)
+class UnknownLayout:
+    """What may be expected of a runway of which nothing is known: everything in widths of the runway, itself a guess.
+
+    A scale that is wrong therefore moves no window. free: strip about the centre line that all of ICAO's layouts leave free
+    of stripes, by their double spacing there (3.6 m on 45 and 60 m); beside the borders none does (0.6 m on 30 m). Stripes
+    of `coverage` of the width are expected at start..start + stripes (as on 45 m); no borderline is looked for up to
+    `clear` behind the threshold, nor beyond `length`, unless less than `ahead` is left of that.
+
+    Source     ICAO Annex 14, vol. I, 5.2.4; runways are 50 to 70 widths long.
+    """
+
+    free: float = 0.06
+    coverage: float = 0.5
+    start: float = 0.13
+    stripes: float = 0.67
+    clear: float = 1.6
+    length: float = 50.0
+    ahead: float = 7.0
+
+
+@dataclass(frozen=True, slots=True)
 class RunwayMap:
     """The runway as the onboard side believes it to be.
 
     width, length [m]; slope [rad] > 0 uphill along x; `paint` are further painted rectangles (x0, x1, y0, y1) [m] that a
     search for a borderline must not reach (the default fits the default size); `brighter`: the runway is brighter than its
-    surroundings, which decides the polarity of its edges (the sky is always taken as brighter than the ground).
+    surroundings, which decides the polarity of its edges (the sky is always taken as brighter than the ground);
+    paint_contrast: of paint on the surface, over that of the surface beside its surroundings (70 / 55 grey levels).
     """
 
     width: float = 29.0
     length: float = 1680.0
     slope: float = 0.0
-    stripes: ThresholdStripes = ThresholdStripes()
+    stripes: ThresholdStripes | UnknownLayout = ThresholdStripes()
     mouths: tuple[TaxiwayMouth, ...] = ()
     paint: tuple[tuple[float, float, float, float], ...] = AIMING_AND_TOUCHDOWN
     brighter: bool = True
+    paint_contrast: float = 1.27
+
+    @staticmethod
+    def unknown(width: float = 45.0, brighter: bool = True) -> RunwayMap:
+        """A level runway of which nothing is known; `width` [m], a guess, is the unit of everything.
+
+        If it is wrong, windows are still placed right by a pose of which x, y and H are as wrong.
+        """
+        layout = UnknownLayout()
+        contrast = 1.27 if brighter else 0.0  # how bright paint is on something dark, nobody knows
+        return RunwayMap(width, layout.length * width, 0.0, layout, (), (), brighter, contrast)
 
     def __post_init__(self) -> None:
         if not (self.width > 0.0 and math.isfinite(self.width)):
@@ -84,7 +117,7 @@ class RunwayMap:
             raise ValueError(f"runway map: length must be > 0 m, not {self.length}")
         if not abs(self.slope) < 0.2:
             raise ValueError(f"runway map: slope is in rad and must be below 0.2, not {self.slope}")
-        if 2.0 * self.stripes.outermost >= self.width:
+        if isinstance(self.stripes, ThresholdStripes) and 2.0 * self.stripes.outermost >= self.width:
             raise ValueError(
                 f"runway map: threshold stripes reach {self.stripes.outermost} m from the centre line, wider than the "
                 f"runway ({self.width} m); use fewer stripes"
@@ -93,9 +126,8 @@ class RunwayMap:
     def border_paint(self) -> Array:
         """(m, 4) x0, x1 [m], Feature, |y| [m] to which paint reaches on that side."""
         half, rows = 0.5 * self.width, []
-        boxes = list(self.paint)
-        if self.stripes.count:
-            s = self.stripes
+        boxes, s = list(self.paint), self.stripes
+        if isinstance(s, ThresholdStripes) and s.count:
             boxes.append((s.start, s.start + s.length, -s.outermost, s.outermost))
             far = self.length - s.start
             boxes.append((far - s.length, far, -s.outermost, s.outermost))
@@ -104,6 +136,18 @@ class RunwayMap:
                 rows.append((x0, x1, float(Feature.LEFT), -y0))
                 rows.append((x0, x1, float(Feature.RIGHT), y1))
         return np.array(rows, dtype=float).reshape(-1, 4)
+
+    def row(self) -> Array:
+        """(10,) what `placement.place` knows of the runway, in its columns LENGTH to UNIT."""
+        s, contrast = self.stripes, self.paint_contrast
+        if isinstance(s, UnknownLayout):
+            layout = (s.length, self.slope, math.inf, 0.5 * s.free, s.start, s.stripes, s.coverage * contrast)
+            return np.array([*layout, s.clear, s.ahead, 1.0], dtype=float)
+        bright = s.count * s.width / self.width * contrast
+        inner = s.gap if s.count else 0.0
+        return np.array(
+            [self.length, self.slope, s.outermost, inner, s.start, s.length, bright, 0.0, 0.0, 0.0], dtype=float
+        )
 
     def mouth_rows(self) -> Array:
         """(m, 3) x0, x1 [m], Feature."""

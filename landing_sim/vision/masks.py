@@ -1,8 +1,8 @@
 """Elongated ternary masks: where, along its search path, an edge crosses a window, to a few hundredths of a pixel.
 
-A mask is `length` pixels long, laid along the predicted edge, with the profile - - - 0 + + + across it. Sliding it along
-the search path is the same as first averaging the rows of pixels along the edge and then correlating the averaged
-profile P with the ternary one:
+A mask is `length` pixels long, laid along the predicted edge, with the profile - - - 0 + + + across it, or - 0 + where
+something else is near: an arm of 3 or of 1 pixel. Sliding it along the search path is the same as first averaging the rows
+of pixels along the edge and then correlating the averaged profile P with the ternary one:
 
     R(k) = P(k+1) + P(k+2) + P(k+3) - P(k-1) - P(k-2) - P(k-3)
 
@@ -22,11 +22,12 @@ import numpy as np
 from landing_sim.jit import kernel
 from landing_sim.types import Array
 
+_FIRST = 0.4  # of the best contrast in the window: what the first edge on the way in must have
 REACH = 4  # steps beyond the search range that the mask and the parabola look at
 
 # columns of F and I: see `placement`, which imports this module
 _STEP, _ALONG, _ORIGIN, _NORMAL_STEP, _OFFSET = 4, 6, 8, 10, 11
-_FEATURE, _STATUS, _HALF, _SEARCH, _CORNER = 0, 1, 2, 3, 4
+_FEATURE, _STATUS, _HALF, _SEARCH, _CORNER, _ARM = 0, 1, 2, 3, 4, 6
 _FOUND, _NO_CONTRAST, _AMBIGUOUS = 0, 2, 3  # values of signals.Status
 
 
@@ -36,30 +37,60 @@ def _phi(s: float) -> float:
 
 
 @kernel
-def _response(delta: float, blur: float) -> float:
+def _response(delta: float, blur: float, arm: int) -> float:
     """R(0) for an ideal edge of unit contrast and Gaussian `blur` at `delta`."""
     r = 0.0
-    for k in range(1, 4):
+    for k in range(1, arm + 1):
         r += _phi((k - delta) / blur) - _phi((-k - delta) / blur)
     return r
 
 
 @kernel
-def _curvature(delta: float, blur: float) -> float:
+def _curvature(delta: float, blur: float, arm: int) -> float:
     """D = 2 R(0) - R(1) - R(-1) for an ideal edge of unit contrast and Gaussian `blur` at `delta`."""
     p = 0.0
-    for k, c in ((1, 1.0), (3, 1.0), (4, -1.0)):
+    for k, c in ((1, 1.0), (arm, 1.0), (arm + 1, -1.0)):
         p += c * (_phi((k - delta) / blur) - _phi((-k - delta) / blur))
     return p
 
 
 @kernel
-def _parabola(delta: float, blur: float) -> float:
+def _parabola(delta: float, blur: float, arm: int) -> float:
     """What the three-point parabola makes of an ideal edge at `delta`."""
     n = -2.0 * _phi(-delta / blur)
-    for k, c in ((1, -1.0), (3, 1.0), (4, 1.0)):
+    for k, c in ((1, -1.0), (arm, 1.0), (arm + 1, 1.0)):
         n += c * (_phi((k - delta) / blur) + _phi((-k - delta) / blur))
-    return 0.5 * n / _curvature(delta, blur)
+    return 0.5 * n / _curvature(delta, blur, arm)
+
+
+@kernel
+def pulled(begin: float, end: float, brighter: float, blur: float) -> float:
+    """By how much [steps] an arm of 1 measures an edge of unit contrast too far up: beyond it, the scene is by as much as
+    `brighter` brighter between begin and end [steps].
+
+    Source     own: the mask's response to all three blurred edges, read as `measure` reads it.
+    """
+    P = np.empty(2 * REACH + 1)
+    for k in range(2 * REACH + 1):
+        s = float(k - REACH)
+        P[k] = _phi(s / blur) + brighter * (_phi((s - begin) / blur) - _phi((s - end) / blur))
+    best = 2
+    for k in range(2, 2 * REACH - 1):
+        if P[k + 1] - P[k - 1] > P[best + 1] - P[best - 1]:
+            best = k
+    N = P[best + 2] - 2.0 * P[best] + P[best - 2]
+    raw = 0.5 * N / (2.0 * (P[best + 1] - P[best - 1]) - P[best + 2] + P[best - 2])
+    return best - REACH + _edge_at(raw, blur, 1)[0]
+
+
+@kernel
+def _edge_at(raw: float, blur: float, arm: int) -> tuple[float, float]:
+    """Where an ideal edge is of which the parabola makes `raw`, and the parabola's gain there."""
+    d, gain = raw, 1.0
+    for _ in range(2):
+        gain = (_parabola(d + 0.05, blur, arm) - _parabola(d - 0.05, blur, arm)) / 0.1
+        d = min(0.6, max(-0.6, d + (raw - _parabola(d, blur, arm)) / gain))
+    return d, gain
 
 
 @kernel
@@ -117,12 +148,13 @@ def measure(
     Returns
     -------
     z (n,) [px] along the direction from the centre; variance (n,) [px^2]; contrast (n,) [grey levels]; status (n,) int64.
-    All n rows; z and variance are NaN where not found.
+    All n rows; z and variance are NaN where not found. With an arm of 1 the first edge on the way into the runway counts
+    and not the best one, and nothing is ambiguous: what is painted lies behind it.
 
     The parabola's own bias, up to 0.02 px, is taken out with the response of an ideal edge. The variance follows from
     it too: with a numerator N = R(1) - R(-1) and a curvature D, var = (var N / 4 + z^2 var D) / D^2, and white pixel noise
-    gives var N = 10 - 8 b, var D = 6 - 16 b times the variance of P, where b is the mean a (1 - a) of the interpolation
-    across the edge.
+    gives var N = 10 - 8 b, var D = 6 - 16 b times the variance of P (arm 1: 6 - 12 b and 10 - 28 b), where b is the mean
+    a (1 - a) of the interpolation across the edge.
     """
     n = len(I)
     z, variance, contrast = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n)
@@ -132,15 +164,18 @@ def measure(
     P, R = np.empty(longest), np.empty(longest)
     for m in range(len(look)):
         i = look[m]
-        half, search = I[i, _HALF], I[i, _SEARCH]
+        half, search, arm = I[i, _HALF], I[i, _SEARCH], I[i, _ARM]
         su, sv, advance = F[i, _STEP], F[i, _STEP + 1], F[i, _NORMAL_STEP]
         reach = search + REACH
         across, along = profile(
             images[m], F[i, _ORIGIN] - I[i, _CORNER], F[i, _ORIGIN + 1] - I[i, _CORNER + 1], su, sv,
             F[i, _ALONG], F[i, _ALONG + 1], half, reach, P,
         )  # fmt: skip
-        for k in range(3, 2 * reach - 2):
-            R[k] = polarity[I[i, _FEATURE]] * (P[k + 1] + P[k + 2] + P[k + 3] - P[k - 1] - P[k - 2] - P[k - 3])
+        for k in range(arm, 2 * reach + 1 - arm):
+            r = P[k + 1] - P[k - 1]
+            if arm == 3:
+                r = P[k + 1] + P[k + 2] + P[k + 3] - P[k - 1] - P[k - 2] - P[k - 3]
+            R[k] = polarity[I[i, _FEATURE]] * r
         best, second = -1, 0.0
         for k in range(reach - search, reach + search + 1):
             if R[k] > R[k - 1] and R[k] >= R[k + 1] and (best < 0 or R[k] > R[best]):
@@ -149,30 +184,33 @@ def measure(
             status[i] = _NO_CONTRAST
             continue
         for k in range(reach - search, reach + search + 1):
-            if abs(k - best) > 3 and R[k] > R[k - 1] and R[k] >= R[k + 1]:
-                second = max(second, R[k])
+            if R[k] > R[k - 1] and R[k] >= R[k + 1]:
+                if arm == 1 and k < best and R[k] > _FIRST * R[best]:
+                    best = k
+                elif arm == 3 and abs(k - best) > 3:
+                    second = max(second, R[k])
         length = 2 * half + 1
         # neighbours along the edge share pixels where the path is sheared: their sum is nearly that of whole pixels
         var_P = (noise * noise + 1.0 / 12.0) / length * (1.0 - 2.0 * along / length)
-        contrast[i] = R[best] / 3.0  # a lower bound until the blur is known
-        if contrast[i] < max(min_contrast, min_snr * math.sqrt(6.0 * var_P) / 3.0):
+        contrast[i] = R[best] / arm  # a lower bound until the blur is known
+        if contrast[i] < max(min_contrast, min_snr * math.sqrt(2.0 * arm * var_P) / arm):
             status[i] = _NO_CONTRAST
             continue
-        if second > ambiguity * R[best] and second > min_snr * math.sqrt(6.0 * var_P):
+        if second > ambiguity * R[best] and second > min_snr * math.sqrt(2.0 * arm * var_P):
             status[i] = _AMBIGUOUS
             continue
         b = blur / advance
         b = math.sqrt(b * b + across)
         raw = 0.5 * (R[best + 1] - R[best - 1]) / (2.0 * R[best] - R[best + 1] - R[best - 1])
-        d, gain = raw, 1.0
-        for _ in range(2):
-            gain = (_parabola(d + 0.05, b) - _parabola(d - 0.05, b)) / 0.1
-            d = min(0.6, max(-0.6, d + (raw - _parabola(d, b)) / gain))
+        d, gain = _edge_at(raw, b, arm)
         size = math.hypot(su, sv)
         z[i] = (best - reach + d) * size + F[i, _OFFSET]
-        contrast[i] = R[best] / _response(d, b)
-        D = contrast[i] * _curvature(d, b) * gain
-        var = var_P * ((10.0 - 8.0 * across) / 4.0 + raw * raw * (6.0 - 16.0 * across)) / (D * D)
+        contrast[i] = R[best] / _response(d, b, arm)
+        D = contrast[i] * _curvature(d, b, arm) * gain
+        var_N, var_D = 10.0 - 8.0 * across, 6.0 - 16.0 * across
+        if arm == 1:
+            var_N, var_D = 6.0 - 12.0 * across, 10.0 - 28.0 * across
+        var = var_P * (var_N / 4.0 + raw * raw * var_D) / (D * D)
         variance[i] = (var + floor * floor / (advance * advance)) * size * size
         status[i] = _FOUND
     return z, variance, contrast, status

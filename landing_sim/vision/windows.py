@@ -93,7 +93,7 @@ class EdgeConfig:
 
 @dataclass(frozen=True, slots=True)
 class Windows:
-    """Windows as `placement` lays them out: rows of F (n, 12) and I (n, 6), all of size width x height [px]."""
+    """Windows as `placement` lays them out: rows of F (n, 12) and I (n, 7), all of size width x height [px]."""
 
     F: Array
     I: np.ndarray
@@ -150,12 +150,11 @@ class WindowPlanner:
         self._lever: Array = np.array(camera.p_BC, dtype=float)
         self._lens: Array = np.array([k.f, k.cx, k.cy], dtype=float)
         self._frame: Array = np.array([k.width, k.height], dtype=float)
-        stripes = runway.stripes
-        self._runway: Array = np.array(
-            [runway.length, runway.slope, stripes.outermost, stripes.gap if stripes.count else 0.0], dtype=float
-        )
+        self._runway: Array = runway.row()
         self._paint, self._mouths = runway.border_paint(), runway.mouth_rows()
-        self._rule: Array = np.array([s.mask, s.sigmas, s.search_min, s.search_max, s.extra_sigma, s.separation], float)
+        self._rule: Array = np.array(
+            [s.mask, s.sigmas, s.search_min, s.search_max, s.extra_sigma, s.separation, camera.blur], float
+        )
         sign = 1.0 if runway.brighter else -1.0
         self._polarity: Array = np.array([sign, sign, sign, 1.0])
         self._noise: Array = np.array([camera.blur, camera.noise, e.min_contrast, e.min_snr, e.ambiguity, e.floor])
@@ -188,5 +187,5 @@ class WindowPlanner:
         NaN where not found. Windows whose status is not FOUND are not looked at.
         """
         look = np.flatnonzero(windows.I[:, col.STATUS] == _FOUND)
-        images = frame.windows(windows.I[look, col.CORNER :], windows.width, windows.height)
+        images = frame.windows(windows.I[look, col.CORNER : col.CORNER + 2], windows.width, windows.height)
         return measure(images, look, windows.F, windows.I, self._polarity, self._noise)  # type: ignore[no-any-return]
