@@ -290,6 +290,7 @@ def test_statements_cannot_smuggle_markup():
         (0.0102, "0.0102"),
         (2.0, "2"),
         (100.0, "100"),
+        (2.6e-9, "3e-09"),
     ],
 )
 def test_numbers(value, shown):

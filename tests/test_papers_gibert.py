@@ -14,7 +14,7 @@ from landing_sim.papers import claims, gibert_figures, point_approach, report
 from landing_sim.papers import gibert_2015 as paper
 from landing_sim.papers import gibert_checks as check
 from landing_sim.papers import gibert_trials as g
-from landing_sim.papers.academic_example import Trial
+from landing_sim.papers.academic_example import Trial, settings
 from landing_sim.papers.courses import Course, largest_step, rms_between, settling
 
 JOBS = claims.runs_of(paper.CLAIMS)
@@ -47,6 +47,16 @@ def test_every_part_of_the_paper_is_claimed():
 def test_jobs_differ_in_what_is_listed():
     listed = [(job.setting(), job.seeds()) for job in JOBS]
     assert len(set(listed)) == len(JOBS)
+
+
+def test_settings_are_told_as_they_would_be_written():
+    from landing_sim.estimators.ranging.gains import HighGain
+    from landing_sim.estimators.ranging.gibert import Gibert, GibertDiscrete
+
+    for observer in (Gibert(), g.SLOW, g.ON_APPROACH, Gibert(HighGain(xi=0.7), output=2)):
+        written = settings(observer)
+        assert eval(written, {c.__name__: c for c in (Gibert, GibertDiscrete, HighGain)}) == observer
+    assert settings(g.SLOW) == "Gibert(kappa=HighGain(lambda1=2.04))"
 
 
 def test_misprints_are_reported(results):

@@ -6,7 +6,8 @@ here. x3 never vanishes. The true course is exact, by the matrix exponential.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from typing import Any
 
 import numpy as np
 
@@ -52,9 +53,17 @@ class Trial:
         return f"every {1e3 * self.dt:g} ms, {noise}{', left for right' if self.mirrored else ''}"
 
 
-def settings(observer: RangeObserver) -> str:
-    """An observer's class and settings as it would be written."""
-    return repr(observer).replace("inf", "∞")
+def settings(part: Any) -> str:
+    """An observer, or a part of its settings, as it would be written: only what differs from the defaults."""
+    if not is_dataclass(part):
+        return repr(part)
+    told = []
+    for field in fields(part):
+        default = field.default if field.default_factory is MISSING else field.default_factory()
+        value = getattr(part, field.name)
+        if value != default:
+            told.append(f"{field.name}={settings(value)}")
+    return f"{type(part).__name__}({', '.join(told)})"
 
 
 def course(dt: float, duration: float) -> Array:

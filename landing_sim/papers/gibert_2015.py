@@ -30,7 +30,7 @@ LEAD = (
 FIGURES = "The paper's own curves are not at hand as data: these are ours, of what its figures show."
 RUNS = (
     "Made by this report alone: none is a scenario. The example is exact; its noise is Gaussian, a share of each measured "
-    "coordinate, each sample on its own."
+    "coordinate, each sample on its own. Settings as in landing_sim.estimators.ranging; only what is not the default."
 )
 
 

@@ -53,6 +53,8 @@ def number(value: float | None) -> str:
         return "–"
     if value == 0.0:
         return "0"
+    if abs(value) < 5e-5:
+        return f"{value:.0e}"
     digits = max(0, 2 - math.floor(math.log10(abs(value))))
     text = f"{value:.{min(digits, 4)}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
