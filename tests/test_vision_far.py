@@ -15,7 +15,7 @@ from landing_sim.geometry.runway_image import horizon_dip
 from landing_sim.geometry.so3 import camera_from_body, from_euler
 from landing_sim.geometry.vanishing import down_from_level_line, heading_from_point, roll_and_pitch
 from landing_sim.signals import EdgeSet, Feature, Status
-from landing_sim.vision import placement as col
+from landing_sim.vision import layout as col
 from landing_sim.vision.acquisition import Acquisition
 from landing_sim.vision.believed import RunwayMap
 from landing_sim.vision.prediction import camera_pose

@@ -12,11 +12,12 @@ from vision_bench import APPROACH, CAMERA, LEVER, RAD, Bench, fixate, pose_of, s
 
 from landing_sim.geometry.runway_image import displacement, horizon_dip, image_line, plane_normal
 from landing_sim.signals import CameraSample, Estimate, Feature, Sample, Status
-from landing_sim.vision import placement as col
+from landing_sim.vision import layout as col
 from landing_sim.vision.believed import BelievedCamera, RunwayMap, TaxiwayMouth, ThresholdStripes
 from landing_sim.vision.front_end import FrontEndConfig, RunwayFrontEnd
 from landing_sim.vision.masks import measure, pulled
 from landing_sim.vision.prediction import camera_pose, jacobian
+from landing_sim.vision.threshold import clean_strips
 from landing_sim.vision.windows import Scheme, SearchConfig, WindowPlanner
 from landing_sim.world.runway import Runway, Taxiway
 
@@ -444,6 +445,6 @@ def test_no_believed_pose_however_odd_brings_it_down() -> None:
 )
 def test_threshold_windows_keep_off_side_strips_too_narrow_for_them(width: float, stripes: int, strips: int) -> None:
     painted = ThresholdStripes(stripes)
-    clean = col.clean_strips(width, painted.outermost, painted.gap)
+    clean = clean_strips(width, painted.outermost, painted.gap)
     assert len(clean) == strips
     assert clean[-1].tolist() == [-painted.gap, painted.gap]

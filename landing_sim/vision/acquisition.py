@@ -22,8 +22,9 @@ from landing_sim.signals import CameraSample, Feature, Status
 from landing_sim.types import Array
 from landing_sim.vision.believed import BelievedCamera, RunwayMap
 from landing_sim.vision.hough import borders, depth_profile, edge_points, horizon_line
-from landing_sim.vision.placement import INNER, OUTER, clean_strips, in_metres
+from landing_sim.vision.layout import INNER, OUTER
 from landing_sim.vision.prediction import camera_pose
+from landing_sim.vision.threshold import clean_strips, in_metres
 from landing_sim.vision.windows import EdgeConfig, SearchConfig, WindowPlanner
 
 _PROFILE_BIAS = 0.3  # [px] of the threshold in the mean of many lines: paint beside the strips

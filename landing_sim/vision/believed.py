@@ -138,7 +138,7 @@ class RunwayMap:
         return np.array(rows, dtype=float).reshape(-1, 4)
 
     def row(self) -> Array:
-        """(10,) what `placement.place` knows of the runway, in its columns LENGTH to UNIT."""
+        """(10,) what placing windows needs of the runway: fields LENGTH to UNIT of `layout`."""
         s, contrast = self.stripes, self.paint_contrast
         if isinstance(s, UnknownLayout):
             layout = (s.length, self.slope, math.inf, 0.5 * s.free, s.start, s.stripes, s.coverage * contrast)

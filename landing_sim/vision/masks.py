@@ -21,13 +21,23 @@ import numpy as np
 
 from landing_sim.jit import kernel
 from landing_sim.types import Array
+from landing_sim.vision.layout import (
+    ALONG,
+    ARM,
+    CORNER,
+    FEATURE,
+    HALF,
+    NORMAL_STEP,
+    OFFSET,
+    ORIGIN,
+    SEARCH,
+    STATUS,
+    STEP,
+)
 
 _FIRST = 0.4  # of the best contrast in the window: what the first edge on the way in must have
 REACH = 4  # steps beyond the search range that the mask and the parabola look at
 
-# columns of F and I: see `placement`, which imports this module
-_STEP, _ALONG, _ORIGIN, _NORMAL_STEP, _OFFSET = 4, 6, 8, 10, 11
-_FEATURE, _STATUS, _HALF, _SEARCH, _CORNER, _ARM = 0, 1, 2, 3, 4, 6
 _FOUND, _NO_CONTRAST, _AMBIGUOUS = 0, 2, 3  # values of signals.Status
 
 
@@ -139,7 +149,7 @@ def measure(
 
     Parameters
     ----------
-    images : (m, h, w) uint8: pixels of the windows look (m,), rows of F and I (see `placement`)
+    images : (m, h, w) uint8: pixels of the windows look (m,), rows of F and I (see `layout`)
     polarity : (4,) by Feature: +1 if brightness rises along the step, else -1
     rule : blur [px] sigma of the optics; noise [grey levels] sigma of a pixel; min_contrast [grey levels]; min_snr,
         contrast over its own standard deviation; ambiguity: an edge is doubtful if another one in the window has more than
@@ -158,24 +168,24 @@ def measure(
     """
     n = len(I)
     z, variance, contrast = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n)
-    status = I[:, _STATUS].copy()
+    status = I[:, STATUS].copy()
     blur, noise, min_contrast, min_snr, ambiguity, floor = rule[0], rule[1], rule[2], rule[3], rule[4], rule[5]
-    longest = 2 * (I[:, _SEARCH].max() + REACH) + 1 if n else 1
+    longest = 2 * (I[:, SEARCH].max() + REACH) + 1 if n else 1
     P, R = np.empty(longest), np.empty(longest)
     for m in range(len(look)):
         i = look[m]
-        half, search, arm = I[i, _HALF], I[i, _SEARCH], I[i, _ARM]
-        su, sv, advance = F[i, _STEP], F[i, _STEP + 1], F[i, _NORMAL_STEP]
+        half, search, arm = I[i, HALF], I[i, SEARCH], I[i, ARM]
+        su, sv, advance = F[i, STEP], F[i, STEP + 1], F[i, NORMAL_STEP]
         reach = search + REACH
         across, along = profile(
-            images[m], F[i, _ORIGIN] - I[i, _CORNER], F[i, _ORIGIN + 1] - I[i, _CORNER + 1], su, sv,
-            F[i, _ALONG], F[i, _ALONG + 1], half, reach, P,
+            images[m], F[i, ORIGIN] - I[i, CORNER], F[i, ORIGIN + 1] - I[i, CORNER + 1], su, sv,
+            F[i, ALONG], F[i, ALONG + 1], half, reach, P,
         )  # fmt: skip
         for k in range(arm, 2 * reach + 1 - arm):
             r = P[k + 1] - P[k - 1]
             if arm == 3:
                 r = P[k + 1] + P[k + 2] + P[k + 3] - P[k - 1] - P[k - 2] - P[k - 3]
-            R[k] = polarity[I[i, _FEATURE]] * r
+            R[k] = polarity[I[i, FEATURE]] * r
         best, second = -1, 0.0
         for k in range(reach - search, reach + search + 1):
             if R[k] > R[k - 1] and R[k] >= R[k + 1] and (best < 0 or R[k] > R[best]):
@@ -204,7 +214,7 @@ def measure(
         raw = 0.5 * (R[best + 1] - R[best - 1]) / (2.0 * R[best] - R[best + 1] - R[best - 1])
         d, gain = _edge_at(raw, b, arm)
         size = math.hypot(su, sv)
-        z[i] = (best - reach + d) * size + F[i, _OFFSET]
+        z[i] = (best - reach + d) * size + F[i, OFFSET]
         contrast[i] = R[best] / _response(d, b, arm)
         D = contrast[i] * _curvature(d, b, arm) * gain
         var_N, var_D = 10.0 - 8.0 * across, 6.0 - 16.0 * across

@@ -16,7 +16,7 @@ import numpy as np
 
 from landing_sim.signals import Frame, Status
 from landing_sim.types import Array
-from landing_sim.vision import placement as col
+from landing_sim.vision import layout as col
 from landing_sim.vision.believed import BelievedCamera, RunwayMap
 from landing_sim.vision.masks import measure
 from landing_sim.vision.placement import place
@@ -93,7 +93,7 @@ class EdgeConfig:
 
 @dataclass(frozen=True, slots=True)
 class Windows:
-    """Windows as `placement` lays them out: rows of F (n, 12) and I (n, 7), all of size width x height [px]."""
+    """Windows as placed: rows of F (n, 12) and I (n, 7), see `layout`, all of size width x height [px]."""
 
     F: Array
     I: np.ndarray
