@@ -35,6 +35,7 @@ NOMINAL_WIDTH = 45.0  # [m] what an unknown runway is drawn with until its own m
 
 
 def believed_camera(scenario: Scenario, vehicle: Vehicle) -> BelievedCamera:
+    """The camera as calibrated."""
     c = scenario.camera
     return BelievedCamera(
         Intrinsics.centred(c.width_px, c.height_px, c.focal_px * scenario.believed.focal_scale),
@@ -47,31 +48,16 @@ def believed_camera(scenario: Scenario, vehicle: Vehicle) -> BelievedCamera:
 
 
 def _believed_width(scenario: Scenario) -> float:
-    if scenario.filter.kind == "observer":
-        return NOMINAL_WIDTH
     believed = scenario.filter.believed_width_m
     return scenario.runway.width_m if believed is None else believed
 
 
 def front_ends(scenario: Scenario, camera: BelievedCamera) -> dict[str, FrontEnd]:
-    runway, v, s = scenario.runway, scenario.vision, scenario.sensors
-    seen = truth.runway(scenario)
-    # marks come in pairs either side of the centreline: the map keeps how far out they reach
-    blocks = [m for m in seen.markings if m.kind in ("aiming_point", "touchdown_zone")]
-    paint = sorted({(m.x0, m.x1, -max(-m.y0, m.y1), max(-m.y0, m.y1)) for m in blocks if m.y1 > 0.0})
-    known = RunwayMap(
-        width=_believed_width(scenario),
-        length=runway.length_m,
-        slope=seen.slope,
-        stripes=ThresholdStripes(stripe_count(runway.width_m) if runway.markings else 0),
-        paint=tuple(paint),
-        brighter=runway.grey.surface > runway.grey.grass,
-        mouths=tuple(
-            TaxiwayMouth(*t.mouth, Feature.LEFT if t.side == "left" else Feature.RIGHT)
-            for t, wanted in zip(seen.taxiways, runway.taxiways)
-            if wanted.mapped
-        ),
-    )
+    """What turns each sensor's samples into measurements."""
+    v, s = scenario.vision, scenario.sensors
+    brighter = scenario.runway.grey.surface > scenario.runway.grey.grass
+    unknown = scenario.filter.kind == "observer"
+    known = RunwayMap.unknown(NOMINAL_WIDTH, brighter) if unknown else _map(scenario, brighter)
     config = FrontEndConfig(v.windows, v.platform_angle, edges=EdgeConfig(floor=v.edge_floor_px))
     front_end = RunwayFrontEnd(known, camera, config)
     return {
@@ -84,7 +70,29 @@ def front_ends(scenario: Scenario, camera: BelievedCamera) -> dict[str, FrontEnd
     }
 
 
+def _map(scenario: Scenario, brighter: bool) -> RunwayMap:
+    """The runway as its chart has it."""
+    runway, seen = scenario.runway, truth.runway(scenario)
+    # marks come in pairs either side of the centreline: the map keeps how far out they reach
+    blocks = [m for m in seen.markings if m.kind in ("aiming_point", "touchdown_zone")]
+    paint = sorted({(m.x0, m.x1, -max(-m.y0, m.y1), max(-m.y0, m.y1)) for m in blocks if m.y1 > 0.0})
+    return RunwayMap(
+        width=_believed_width(scenario),
+        length=runway.length_m,
+        slope=seen.slope,
+        stripes=ThresholdStripes(stripe_count(runway.width_m) if runway.markings else 0),
+        paint=tuple(paint),
+        brighter=brighter,
+        mouths=tuple(
+            TaxiwayMouth(*t.mouth, Feature.LEFT if t.side == "left" else Feature.RIGHT)
+            for t, wanted in zip(seen.taxiways, runway.taxiways)
+            if wanted.mapped
+        ),
+    )
+
+
 def estimator(scenario: Scenario, vehicle: Vehicle, camera: BelievedCamera, noise: Noise) -> Estimator:
+    """The filter or observer that is asked for, with the aircraft believed to be a little different from what it is."""
     f, b = scenario.filter, scenario.believed
     if f.kind == "observer":
         return _late(scenario, range_observer(scenario, camera))

@@ -28,6 +28,7 @@ from landing_sim.world.wind import CrosswindStep, ExponentialGust, SteadyWind, W
 
 
 def runway(scenario: Scenario) -> Runway:
+    """The runway as it is."""
     r = scenario.runway
     return Runway(
         width=r.width_m,
@@ -40,6 +41,7 @@ def runway(scenario: Scenario) -> Runway:
 
 
 def wind(scenario: Scenario, noise: Noise) -> Wind:
+    """All that moves the air."""
     w = scenario.wind
     everywhere = w.crosswind_from_x_m is None
     turbulence = None
@@ -75,6 +77,7 @@ def platform(scenario: Scenario, vehicle: Vehicle, noise: Noise) -> PanTilt | St
 
 
 def plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt | Strapdown, wind: Wind) -> JsbsimPlant:
+    """The aircraft in trim at its start."""
     a, s, r = scenario.aircraft, scenario.initial, scenario.runway
     airspeed = vehicle.guidance.path.approach_mps if s.airspeed_mps is None else s.airspeed_mps
     frame = RunwayFrame(
