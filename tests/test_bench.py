@@ -1,0 +1,120 @@
+"""The bench: it runs, its object has what it promises, its bound is the recursion it names, start-up stays light."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT / "tools"))
+
+from bench_parts import bound, flights, where  # noqa: E402
+
+from landing_sim import scenario, vehicle  # noqa: E402
+
+PROMISED = {
+    *("ratio_median", "ratio_min", "ratio_max", "recorded_ratio_median", "bare_step_us", "added_steps_per_frame"),
+    *("realtime_factor", "landings_per_core_minute", "baseline"),
+}
+
+
+def short(seconds: float = 1.5) -> tuple[scenario.Scenario, vehicle.Vehicle]:
+    s = scenario.load("do128/gust", [f"time.limit_s={seconds}"])
+    return s, vehicle.load(s.aircraft.model)
+
+
+def test_one_repeat_prints_the_promised_object() -> None:
+    program = [sys.executable, str(ROOT / "tools" / "bench.py"), "--json", "--repeats", "1"]
+    short_flight = ["--set", "time.limit_s=1.92", "--skip", "memory", "--skip", "first"]
+    result = subprocess.run([*program, *short_flight], capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    found = json.loads(result.stdout)
+    assert set(found) == {"do128", "transport", "imports"}
+    for name in ("do128", "transport"):
+        figures = found[name]
+        assert figures.keys() >= PROMISED
+        assert figures["repeats"] == 1 and figures["steps"] == 384
+        assert figures["ratio_median"] > figures["plant_ratio_median"] > 1.0
+        assert figures["recorded_ratio_median"] > figures["ratio_median"]
+        assert 1.0 < figures["bare_step_us"] < 200.0
+        share = sum(part["share"] for part in figures["where"].values())
+        assert share == pytest.approx(1.0)
+        assert figures["where"]["plant: step"]["calls"] == figures["steps"]
+    assert found["do128"]["baseline"]["measured_share"] > 0.9
+    assert found["imports"].keys() >= {"numpy_cpu_s", "help_per_numpy", "check_per_numpy"}
+
+
+def test_bare_flies_the_same_trajectory_to_the_bit() -> None:
+    s, v = short()
+    tape = flights.tape(s, v)
+    assert tape.steps == len(tape.writes)
+    assert flights.fly_bare(s, v, tape).cpu > 0.0  # raises where it ends elsewhere
+    first_command = next(k for k, writes in enumerate(tape.writes) if k and any(i == 0 for i, _ in writes))
+    broken = flights.Tape(tape.commands, tape.writes[:first_command] + ((),) * (tape.steps - first_command), tape.end)
+    with pytest.raises(RuntimeError, match="to the bit"):
+        flights.fly_bare(s, v, broken)
+
+
+def test_stop_watch_charges_each_part_for_itself() -> None:
+    watch = where.StopWatch()
+
+    def burn(n: int) -> float:
+        return sum(math.sqrt(k) for k in range(n))
+
+    inner = watch.on("inner", lambda: burn(40000))
+    outer = watch.on("outer", lambda: (burn(20000), inner()))
+    watch.start()
+    for _ in range(5):
+        outer()
+    watch.stop()
+    assert watch.calls == {"inner": 5, "outer": 5}
+    assert watch.seconds["inner"] > 1.3 * watch.seconds["outer"] > 0.0
+
+
+def test_bound_is_tichavskys_recursion() -> None:
+    rng = np.random.default_rng(1)
+    F = np.eye(4) + 0.2 * rng.normal(size=(4, 4))
+    A, B = rng.normal(size=(2, 4, 4))
+    J, Q = A @ A.T + np.eye(4), B @ B.T + np.eye(4)
+    H, R = rng.normal(size=(3, 4)), np.array([0.5, 1.0, 2.0])
+    D11, D12 = F.T @ np.linalg.solve(Q, F), -F.T @ np.linalg.inv(Q)
+    D22 = np.linalg.inv(Q) + H.T @ np.diag(1.0 / R) @ H
+    expected = D22 - D12.T @ np.linalg.solve(J + D11, D12)
+    np.testing.assert_allclose(bound.measured(bound.predicted(J, F, Q), H, R), expected, rtol=1e-9)
+
+
+def test_bound_lies_near_the_filters_own_sigma() -> None:
+    """Jacobians at the truth or at an estimate 0.1 % away are nearly the same, and so are the covariances they give."""
+    s, v = short(4.0)
+    parts: list = []
+    steps: list = []
+    log = flights.land(s, v, prepare=parts.append, watch=steps.append).log
+    p = parts[0]
+    limit = bound.Bound(p.estimator, s.runway.width_m, p.plant.trimmed, p.clock.delay * p.clock.dt)
+    sigma = [limit.add(step) for step in steps][-1]
+    assert sigma is not None
+    for name, i in (("x", 9), ("y", 10), ("H", 11)):
+        assert sigma[i] == pytest.approx(log.sigma(name)[-1], rel=0.15)
+    assert 0.8 < np.sqrt(np.mean(np.square(limit.edge_errors))) < 1.2
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["check", "do128/gust"]])
+def test_start_up_is_light(arguments: list[str]) -> None:
+    code = f"""
+import sys
+from landing_sim import cli
+sys.argv = ["landing-sim", *{arguments!r}]
+try:
+    cli.main()
+except SystemExit as end:
+    assert not end.code
+print("\\n" + " ".join(m for m in ("rerun", "matplotlib", "control", "cv2", "jsbsim", "numba") if m in sys.modules))
+"""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.splitlines()[-1] == ""
