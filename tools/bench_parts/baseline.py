@@ -282,7 +282,7 @@ def beside(scenario: Scenario, vehicle: Vehicle, say: Callable[[str], None] = la
         "cycles": int(use.sum()),
     }
     theirs = np.full((len(log), 3), np.nan)
-    theirs[first:] = np.array(trace.mean) - np.array(trace.truth)
+    theirs[first:] = (np.array(trace.mean) - np.array(trace.truth)).reshape(-1, 3)
     for (name, state), column in zip(COMPARED.items(), (0, 2, 1)):
         a, b = theirs[use, column], log.error(state)[use]
         rms = [float(np.sqrt(np.mean(e**2))) if len(e) else math.nan for e in (a, b)]
@@ -291,7 +291,7 @@ def beside(scenario: Scenario, vehicle: Vehicle, say: Callable[[str], None] = la
             f"our_{name}_rms_m": rms[1],
             f"{name}_ratio": rms[0] / rms[1] if rms[1] else math.nan,
         }
-    out["measured_share"] = float(np.mean(np.array(trace.seen)[use[first:]])) if use.any() else math.nan
+    out["measured_share"] = float(np.mean(np.array(trace.seen, bool)[use[first:]])) if use.any() else math.nan
     cost = {name: 1e6 * median(s) if s else math.nan for name, s in trace.seconds.items()}
     render, vision = cost.get("render", math.nan), cost.get("vision", math.nan)
     estimate = cost.get("predict", math.nan) + cost.get("update", math.nan)
