@@ -58,8 +58,8 @@ def test_do128_design_is_robust_and_near_what_was_asked_for() -> None:
             for loop in axis.margins.loops:
                 assert loop.gain_up > 2.0
                 assert loop.gain_down < 0.5
-                assert loop.phase > math.radians(30.0)
-                assert loop.delay > 0.1  # beside the 90 ms already in the loop; traded for sink rate in turbulence
+                assert loop.phase > math.radians(35.0)
+                assert loop.delay > 0.2  # beside the 90 ms already in the loop
             for mode in axis.modes:
                 assert abs(mode.eigenvalue - mode.wanted) < 0.2 * abs(mode.wanted), mode.name
 
@@ -154,7 +154,32 @@ def test_a_gust_that_heading_is_not_corrected_for_is_not_taken_for_sideslip() ->
     assert abs(command(e, r).aileron) > 0.2  # told nothing, it must believe that it slips by 3 m/s
     trim = command(*in_trim()).elevator
     e, r = in_trim(wz=-2.0)
-    assert command(e, replace(r, extra={"downdraught": 0.0})).elevator == pytest.approx(trim, abs=2e-3)
+    assert command(e, replace(r, extra={"downdraught": 0.0})).elevator == pytest.approx(trim, abs=1e-3)
+
+
+def test_lift_lost_to_a_gust_is_answered_at_once_and_what_lasts_is_not() -> None:
+    """5 m/s of sudden tailwind: stick back by 4.5 deg of elevator at 43 m/s, gone within a few filter times."""
+    v, result = do128()
+    gust = v.control.gust
+    assert gust is not None
+    controller, without = (
+        LandingController(replace(result, settings=replace(result.settings, gust=g))) for g in (gust, None)
+    )
+    answers = []
+    for one in (controller, without):
+        memory, out = one.init(), []
+        for k in range(40):
+            e, r = in_trim(wx=5.0 if k >= 5 else 0.0, u=50.0)
+            memory, c = one.step(memory, replace(e, t=0.06 * k), replace(r, extra={"crosswind": 0.0}))
+            out.append(c.elevator)
+        answers.append(out)
+    more = np.degrees(np.subtract(*answers))
+    airspeed = math.hypot(45.0, result.points[0].model.state[2])
+    share = gust.filter_s / (0.06 + gust.filter_s)
+    np.testing.assert_allclose(more[:5], 0.0, atol=1e-12)
+    assert min(more) == pytest.approx(-gust.elevator_deg_per_mps * 5.0 * share * (43.0 / airspeed) ** 2, rel=0.35)
+    assert min(more[5:9]) == min(more)
+    assert abs(more[-1]) < 0.1
 
 
 def test_decrabbed_flight_is_a_steady_sideslip() -> None:

@@ -38,13 +38,14 @@ class ControlMemory:
     elevator: float = math.nan  # [rad]
     aileron: float = 0.0
     rudder: float = 0.0
+    tailwind: float = math.nan  # [m/s] smoothed, along the nose
     rollout: RolloutMemory = ON_TOUCHDOWN
 
 
 class LandingController:
     """interfaces.Controller. Constants only; all memory is in ControlMemory."""
 
-    __slots__ = ("_camera", "_flaps", "_ground_effect", "_integral", "_limits", "_look", "_rollout", "_schedule",
+    __slots__ = ("_camera", "_flaps", "_ground_effect", "_gust", "_integral", "_limits", "_look", "_rollout", "_schedule",
                  "_slowest", "_thrust", "_trim")  # fmt: skip
 
     def __init__(self, design: Design, look: tuple[float, float] = (0.0, 0.0)) -> None:
@@ -63,6 +64,7 @@ class LandingController:
         self._camera, self._look = (math.radians(c.elevation_deg), math.radians(c.max_deg)), look
         self._flaps = (s.flap, s.flap if s.rollout.flap is None else s.rollout.flap)
         self._ground_effect = s.ground_effect
+        self._gust = s.gust
         self._rollout = Rollout(s.rollout)
 
     def init(self) -> ControlMemory:
@@ -87,17 +89,36 @@ class LandingController:
                 ground = RolloutMemory(b.theta, memory.elevator if math.isfinite(memory.elevator) else 0.0)
             ground, (elevator, aileron, rudder, left, right) = self._rollout.step(ground, b, m, reference, dt)
             throttle = int_V = int_H = 0.0
+            tailwind = math.nan
             flap = self._flaps[1]
         else:
             elevator, throttle, aileron, rudder, int_V, int_H = self._fly(memory, b, m, reference, dt)
+            lift, tailwind = self._against_gusts(memory, b, m, dt)
+            elevator += lift
             ground, left, right, flap = ON_TOUCHDOWN, 0.0, 0.0, self._flaps[0]
         last = memory.elevator if memory.elevator == memory.elevator else elevator
         elevator = _limited(elevator, last, dt, *self._limits[0])
         aileron = _limited(aileron, memory.aileron, dt, *self._limits[1])
         rudder = _limited(rudder, memory.rudder, dt, *self._limits[2])
-        return ControlMemory(estimate.t, reference.mode, int_V, int_H, elevator, aileron, rudder, ground), Command(
+        memory = ControlMemory(estimate.t, reference.mode, int_V, int_H, elevator, aileron, rudder, tailwind, ground)
+        return memory, Command(
             elevator, aileron, rudder, throttle, flap, left, right, _clip(pan, most), _clip(tilt, most)
         )
+
+    def _against_gusts(self, memory: ControlMemory, b: Believed, m: Motion, dt: float) -> tuple[float, float]:
+        """Elevator [rad] against the lift that gusts along the nose give or take, and the tailwind [m/s], smoothed.
+
+        Airspeed is fed back slowly. A gust's lift is there at once, and near the ground a gust lasts half a second: it is
+        answered from the wind itself, and only as far as it is faster than the smoothing.
+        """
+        g = self._gust
+        if g is None:
+            return 0.0, math.nan
+        now = b.wx * math.cos(b.psi) + b.wy * math.sin(b.psi)
+        slow = memory.tailwind if math.isfinite(memory.tailwind) else now
+        slow += dt / (dt + g.filter_s) * (now - slow)
+        per_q = (g.airspeed_mps / max(m.airspeed, self._slowest)) ** 2
+        return -math.radians(g.elevator_deg_per_mps) * per_q * (now - slow), slow
 
     def _fly(
         self, memory: ControlMemory, b: Believed, m: Motion, ref: Reference, dt: float

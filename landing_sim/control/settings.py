@@ -175,6 +175,23 @@ class CameraSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class GustSettings:
+    """Elevator against the lift that a gust along the nose gives or takes, at airspeed_mps (as 1/V² elsewhere).
+
+    Tailwind that lasts longer than filter_s is left to the feedback.
+    """
+
+    elevator_deg_per_mps: float
+    airspeed_mps: float
+    filter_s: float
+
+    __pydantic_config__ = _STRICT
+
+    def __post_init__(self) -> None:
+        _positive(airspeed_mps=self.airspeed_mps, filter_s=self.filter_s)
+
+
+@dataclass(frozen=True, slots=True)
 class SpeedSettings:
     """Approach speed by rule, calibrated airspeeds: V_ref = max(reference (m / at_mass)^1/2, least), then
     V_app = V_ref + max(add_least, headwind_share headwind).
@@ -211,6 +228,7 @@ class ControlSettings:
     rollout: RolloutSettings
     ground_effect: GroundEffectSettings | None = None
     camera: CameraSettings = CameraSettings()
+    gust: GustSettings | None = None
 
     __pydantic_config__ = _STRICT
 
