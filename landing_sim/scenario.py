@@ -254,6 +254,9 @@ class Believed(Section):
         0.08, ge=0, le=0.5, description="1 sigma of the relative error of each aerodynamic parameter"
     )
     mass_sigma: float = Field(0.03, ge=0, le=0.5, description="1 sigma of the relative error of mass and inertia")
+    turbulence_mps: NotNegative | None = Field(
+        None, description="reported turbulence, as the wind at 20 ft that goes with it; null = as it is"
+    )
     focal_scale: float = Field(1.0, ge=0.5, le=2, description="believed over true focal length")
     encoder_sigma_deg: float = Field(
         0.03, ge=0, le=5, description="what the data sheet says of the platform's constant angle error, 1 sigma"

@@ -26,6 +26,7 @@ def truth_at(rng: np.random.Generator, x_m: float = -900.0, wind: tuple[float, f
     x = np.zeros(states.N)
     x[: states.H + 1] = [50.0, 0.3, 0.1, 0, 0, 0, 0.01, -0.05, 0.02, x_m, -3.0, -x_m * 0.052 + 4.0]
     x[states.WX : states.WZ + 1] = wind
+    x[states.CX : states.CM + 1] = rng.normal(size=3) * FilterConfig().offset_sigma
     x[states.BP : states.BR + 1] = rng.normal(size=3) * np.deg2rad(0.1)
     x[states.EPAN : states.ETILT + 1] = rng.normal(size=2) * np.deg2rad(0.03)
     x[states.WIDTH] = WIDTH
@@ -39,7 +40,7 @@ def settle(x: np.ndarray, par: np.ndarray) -> np.ndarray:
 
 def fly(x: np.ndarray, s: np.ndarray, par: np.ndarray, q: np.ndarray, dt: float, rng: np.random.Generator) -> None:
     """One cycle of the true motion, in place, with process noise of density q."""
-    Phi = np.empty((15, 15))
+    Phi = np.empty((18, 18))
     u = np.array([COMMAND.elevator, 0.0, 0.0, COMMAND.throttle, COMMAND.flap])
     steps = 4
     for _ in range(steps):
@@ -116,7 +117,7 @@ def inertial(x: np.ndarray, t: float, rng: np.random.Generator, config: FilterCo
 
 
 def run(config: FilterConfig, seed: int, frames: int = 200, sigma: float = 0.1, wind: bool = True, **kw: object):
-    """Fly `frames` cycles; returns times, true states (frames, 21), estimates, and the filter with its last memory."""
+    """Fly `frames` cycles; returns times, true states (frames, 26), estimates, and the filter with its last memory."""
     rng = np.random.default_rng(seed)
     ekf = filter_of(config, **kw)
     par = ekf._par

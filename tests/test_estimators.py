@@ -9,16 +9,19 @@ import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from landing_sim.estimators import kalman, states
+from landing_sim.estimators import kalman, mismatch, states
 from landing_sim.estimators.aircraft_model import dynamics, parameters, propagate
 from landing_sim.estimators.belief import AircraftBelief
 from landing_sim.estimators.edge_model import edge_model
+from landing_sim.estimators.gusts import change as gusts_change
 from landing_sim.estimators.inertial_model import airspeed_model, gyro_model
 from landing_sim.estimators.rewind import Rewind
 from landing_sim.estimators.runway_filter import Blocks, FilterConfig
 from landing_sim.geometry.runway_image import image_line, plane_normal
 from landing_sim.geometry.so3 import camera_from_body, from_euler
+from landing_sim.noise import Noise
 from landing_sim.signals import Status
+from landing_sim.world.dryden import DrydenTurbulence, Turbulence
 
 PAR = parameters(AircraftBelief(), 0.01)
 SHADOW = np.array([0.02, 0.01, -0.03, 0.5, 4000.0, 0.05])
@@ -28,7 +31,7 @@ def random_state(rng: np.random.Generator) -> np.ndarray:
     x = np.zeros(states.N)
     x[:9] = [50, 0, 1, 0, 0, 0, 0, 0.03, 0] + rng.normal(size=9) * [4, 2, 1, 0.1, 0.1, 0.1, 0.2, 0.05, 0.3]
     x[9:15] = [rng.uniform(-1000, -60), rng.normal() * 40, rng.uniform(2, 60), *rng.normal(size=3) * 3]
-    x[15:22] = rng.normal(size=7) * 0.002
+    x[15:25] = rng.normal(size=10) * 0.002
     x[states.WIDTH] = 29.0
     return x
 
@@ -45,16 +48,16 @@ def differences(function, x: np.ndarray, columns: int, h: float = 1e-5) -> np.nd
 
 def f_of(x: np.ndarray) -> np.ndarray:
     f = np.empty(12)
-    dynamics(x, SHADOW, PAR, f, np.empty((12, 15)), False)
+    dynamics(x, SHADOW, PAR, f, np.empty((12, 18)), False)
     return f
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_dynamics_jacobian_against_differences(seed: int) -> None:
     x = random_state(np.random.default_rng(seed))
-    f, A = np.empty(12), np.empty((12, 15))
+    f, A = np.empty(12), np.empty((12, 18))
     dynamics(x, SHADOW, PAR, f, A, True)
-    np.testing.assert_allclose(A, differences(f_of, x, 15), rtol=1e-6, atol=2e-7)
+    np.testing.assert_allclose(A, differences(f_of, x, 18), rtol=1e-6, atol=2e-7)
 
 
 def test_steady_level_flight_by_hand() -> None:
@@ -63,7 +66,7 @@ def test_steady_level_flight_by_hand() -> None:
     x = np.zeros(states.N)
     x[0], x[states.THETA], x[states.H] = 50.0, 0.1, 30.0
     f = np.empty(12)
-    dynamics(x, np.zeros(6), nothing, f, np.empty((12, 15)), False)
+    dynamics(x, np.zeros(6), nothing, f, np.empty((12, 18)), False)
     np.testing.assert_allclose(f[:3], [-9.81 * np.sin(0.1), 0.0, 9.81 * np.cos(0.1)], atol=1e-12)
     np.testing.assert_allclose(f[9:12], [50 * np.cos(0.1), 0.0, 50 * np.sin(0.1)], atol=1e-12)
 
@@ -71,10 +74,10 @@ def test_steady_level_flight_by_hand() -> None:
 def test_transition_matrix_is_the_exponential() -> None:
     """Phi by its series to third order: the next term, |A dt|^4 / 24, bounds what is left out."""
     x = random_state(np.random.default_rng(3))
-    A = np.zeros((15, 15))
-    f, A12 = np.empty(12), np.empty((12, 15))
+    A = np.zeros((18, 18))
+    f, A12 = np.empty(12), np.empty((12, 18))
     shadow = SHADOW.copy()
-    Phi = np.empty((15, 15))
+    Phi = np.empty((18, 18))
     dt = 0.005
     u = np.array([SHADOW[0], SHADOW[1], SHADOW[2], 0.4, 0.5])
     start = x.copy()
@@ -87,7 +90,7 @@ def test_transition_matrix_is_the_exponential() -> None:
 def test_integration_converges_with_fourth_order() -> None:
     """Halving the step of propagate, shadow frozen by its own steady state, cuts the error 16-fold."""
     frozen = parameters(AircraftBelief(tau_surface=1e9, tau_engine=1e9, tau_downwash=1e9), 0.0)
-    Phi = np.empty((15, 15))
+    Phi = np.empty((18, 18))
 
     def end(n: int) -> np.ndarray:
         x, s = random_state(np.random.default_rng(5)), SHADOW.copy()
@@ -262,7 +265,7 @@ def test_blocks_cover_what_the_kinds_promise() -> None:
     assert tuple(split.starts) == (0, 6, 12)
     assert [states.NAMES[i] for i in split.index[:6]] == ["u", "w", "q", "theta", "x", "H"]
     augmented = Blocks.of(FilterConfig())
-    assert len(augmented.index) == 22
+    assert len(augmented.index) == 25
     with_width = Blocks.of(FilterConfig(width="state"))
     assert states.WIDTH in with_width.index and states.WX not in with_width.index
 
@@ -276,6 +279,43 @@ def test_filter_is_consistent_in_a_matched_world() -> None:
         all_nis.append(np.mean([e.residuals.nis / e.residuals.dof for e in estimates[20:]]))
     assert 0.75 < np.mean(all_nees) < 1.3, np.mean(all_nees)
     assert 0.85 < np.mean(all_nis) < 1.15, np.mean(all_nis)
+
+
+def test_offsets_of_the_believed_aircraft_are_narrowed_down_and_leave_the_velocities_clean() -> None:
+    """Lift and pitching moment off by a constant: told from wind in part, and no longer taken for vertical velocity."""
+    prior = FilterConfig().offset_sigma
+    errors = []
+    for seed in range(8):
+        truth, estimates, _, _ = bench.run(FilterConfig(), seed, frames=150)
+        at = [estimates[-1].names.index(name) for name in ("cX", "cZ", "cm", "w")]
+        errors.append(estimates[-1].mean[at] - truth[-1][[states.CX, states.CZ, states.CM, states.W]])
+        assert np.all(np.sqrt(np.diag(estimates[-1].cov))[at[:3]] < 0.75 * np.array(prior))
+    rms = np.sqrt(np.mean(np.square(errors), axis=0))
+    assert np.all(rms[:3] < prior)
+    assert rms[3] < 0.1
+
+
+def test_offset_sigma_is_that_of_perturbed_aircraft() -> None:
+    """To first order and analytic, against drawn aircraft at the believed one's trim."""
+    belief = AircraftBelief()
+    x, shadow = mismatch._level(belief, 46.0, 0.5)
+    at_trim = mismatch._accelerations(belief, x, shadow)
+    np.testing.assert_allclose(at_trim, 0.0, atol=1e-8)
+    noise = Noise(1, "belief")
+    drawn = np.array([mismatch._accelerations(belief.perturbed(noise, 0.08, 0.03), x, shadow) for _ in range(1500)])
+    force = 0.5 * belief.rho * 46.0**2 * belief.S
+    found = drawn.std(axis=0) * [belief.mass / force, belief.mass / force, belief.Iyy / (force * belief.c)]
+    np.testing.assert_allclose(found, mismatch.offset_sigma(belief, 46.0, 0.5, 0.08, 0.03), rtol=0.08)
+
+
+@pytest.mark.parametrize("height", [2.0, 15.0, 50.0])
+def test_reported_turbulence_changes_the_wind_as_drydens_does(height: float) -> None:
+    """The noise that the filter is given is the variance of what the simulated gusts change by in a cycle."""
+    air = DrydenTurbulence(Turbulence(10.0), Noise(3, "air"))
+    gusts = np.array([air.velocity(0.06 * k, 0.0, height, 47.0) for k in range(20000)])
+    found, told = np.diff(gusts, axis=0).var(axis=0), gusts_change(height, 10.0, 47.0, 0.06)
+    assert found[0] == pytest.approx(told[0], rel=0.05)
+    np.testing.assert_allclose(found[1:], told[1:], rtol=0.6)  # the transverse spectra are not first-order
 
 
 def test_consistency_notices_an_overconfident_filter() -> None:
@@ -302,6 +342,7 @@ def test_gate_rejects_a_wrong_edge_and_keeps_the_others() -> None:
     rng = np.random.default_rng(4)
     truth, _, ekf, memory = bench.run(FilterConfig(), 4, frames=60)
     x = truth[-1].copy()
+    memory = ekf.predict(memory, bench.COMMAND, memory.t + 1e-6)  # another image: other noise of the encoders
     m = bench.edges(x, memory.t, rng)
     m.z[1] += 15.0
     after = ekf.update(memory, m)

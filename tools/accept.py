@@ -74,13 +74,18 @@ GUST = (
     *box("touchdown_airspeed_mps", 41.5, 44.5),
 )
 WIDTH = (LANDED, Promise("width_at_loss_m", "max", high=1.0), Promise("width_mean_m", "mean", high=0.4))
-CONSISTENT = (Promise("nees", "mean", 0.5, 2.0), Promise("nis", "mean", 0.7, 1.3))
+STATES = ("u", "v", "w", "p", "q", "r", "phi", "theta", "psi", "x", "y", "H", "wx", "wy", "wz")
+CONSISTENT = (
+    Promise("nees", "mean", 0.5, 2.0),
+    *(Promise(f"nees_{name}", "mean", 0.5, 2.0) for name in STATES),
+    Promise("nis", "mean", 0.7, 1.3),
+)
 
 CAMPAIGNS: dict[str, Campaign] = {
     "gust": Campaign("do128/gust", GUST),
     "calm": Campaign("do128/calm", WEATHER),
     "gust_light": Campaign("do128/gust_light", WEATHER),
-    "gust_moderate": Campaign("do128/gust_moderate", WEATHER),
+    "gust_moderate": Campaign("do128/gust_moderate", WEATHER, range(1, 121)),
     "headwind": Campaign("do128/headwind", WEATHER),
     "tailwind": Campaign("do128/tailwind", WEATHER),
     "consistency": Campaign("do128/gust", CONSISTENT, range(1001, 1061)),
@@ -106,6 +111,8 @@ def fly(job: tuple[str, tuple[str, ...], int]) -> dict[str, float]:
     metrics = dict(flight.verdict.metrics)
     metrics["landed"] = float(flight.verdict.outcome == "landed")
     log = flight.log
+    found = judge.consistency(log)
+    metrics |= {f"nees_{name}": found[name] for name in STATES if name in found}
     if "est_W_m" in log:
         seen = judge.threshold_in_view(log) & log["valid"]
         far = seen & (log["true_x_m"] > -600.0)
@@ -162,7 +169,9 @@ def run(name: str, pool: ProcessPoolExecutor) -> bool:
     print(f"\n{name}: {len(flights)} flights of {campaign.scenario} {' '.join(campaign.changes)}")
     for k in kept:
         bounds = f"[{'' if k['low'] is None else k['low']} .. {'' if k['high'] is None else k['high']}]"
-        print(f"  {'kept  ' if k['kept'] else 'BROKEN'} {k['metric']:24s} {k['statistic']:6s} {k['value']!s:22.8} {bounds}")
+        print(
+            f"  {'kept  ' if k['kept'] else 'BROKEN'} {k['metric']:24s} {k['statistic']:6s} {k['value']!s:22.8} {bounds}"
+        )
     return all(k["kept"] for k in kept)
 
 

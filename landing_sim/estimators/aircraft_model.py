@@ -68,9 +68,9 @@ def downwash(x: Array, alpha: float, flap: float, par: Array) -> float:
 
 @kernel
 def dynamics(x: Array, s: Array, par: Array, f: Array, A: Array, jacobian: bool) -> None:
-    """Fill f (12,) = x' and, if asked, A (12, 15) = df/d(12 states, 3 wind components).
+    """Fill f (12,) = x' and, if asked, A (12, 18) = df/d(12 states, 3 wind components, 3 offsets).
 
-    x (>= 15,) state, layout of `states`; s (6,) shadow: elevator, aileron, rudder [rad], flap, thrust [N], downwash [rad];
+    x (>= 18,) state, layout of `states`; s (6,) shadow: elevator, aileron, rudder [rad], flap, thrust [N], downwash [rad];
     par: see `parameters`.
     """
     u, v, w, p, q, r = x[0], x[1], x[2], x[3], x[4], x[5]
@@ -103,13 +103,13 @@ def dynamics(x: Array, s: Array, par: Array, f: Array, A: Array, jacobian: bool)
     CL = CLw + CLt
     k = par[_KV] + par[_KI] * G
     CD = par[_CD0] + par[_CDF] * flap + k * CLw * CLw
-    CX = CL * sa - CD * ca
-    CZ = -CL * ca - CD * sa
+    CX = CL * sa - CD * ca + x[15]
+    CZ = -CL * ca - CD * sa + x[16]
     CY = par[_CYB] * beta + par[_CYDR] * dr + b2V * (par[_CYP] * p + par[_CYR] * r)
     Clr = par[_CLR0] + par[_CLRL] * CLw
     Cl = par[_CLB] * beta + par[_CLDA] * da + par[_CLDR] * dr + b2V * (par[_CLP] * p + Clr * r)
     # pitch is normalised by 1 m here: chord and arms inside
-    Cm = par[_XAC] * CLw - par[_LT] * CLt + par[_C] * (par[_CM0] + par[_CMF] * flap + par[_CMQ] * q * c2V)
+    Cm = par[_XAC] * CLw - par[_LT] * CLt + par[_C] * (par[_CM0] + par[_CMF] * flap + par[_CMQ] * q * c2V + x[17])
     Cnp = par[_CNP0] + par[_CNPL] * CLw
     Cn = par[_CNB] * beta + par[_CNDR] * dr + par[_CNDAL] * CLw * da + b2V * (Cnp * p + par[_CNR] * r)
 
@@ -156,7 +156,7 @@ def dynamics(x: Array, s: Array, par: Array, f: Array, A: Array, jacobian: bool)
         dCLt = par[_CLT] * (dal + par[_LT] / V * (dq - q * dV_V))
         dCD = 2.0 * k * CLw * dCLw + (par[_KI] * dG * CLw * CLw if i == 6 else 0.0)
         dCL = dCLw + dCLt
-        dCX = dCL * sa - dCD * ca + (CL * ca + CD * sa) * dal
+        dCX = dCL * sa - dCD * ca + (CL * ca + CD * sa) * dal  # the offsets stay
         dCZ = -dCL * ca - dCD * sa + (CL * sa - CD * ca) * dal
         dp_, dr_n = b2V * (dp - p * dV_V), b2V * (dr_ - r * dV_V)
         dCY = par[_CYB] * dbe + par[_CYP] * dp_ + par[_CYR] * dr_n
@@ -188,6 +188,7 @@ def dynamics(x: Array, s: Array, par: Array, f: Array, A: Array, jacobian: bool)
                            + d[i, 2] * (ex * wby - ey * wbx))  # fmt: skip
         A[i, 11] = d[i, 6]
         A[i, 9] = -par[_SLOPE] * d[i, 6]
+    A[0, 15], A[2, 16], A[4, 17] = qS / m, qS / m, qS * par[_C] / Iyy
     # gravity and transport
     A[0, 7] += -g * cth
     A[1, 6] += g * cth * cph
@@ -242,14 +243,14 @@ def thrust(throttle: float, airspeed: float, par: Array) -> float:
 
 @kernel
 def propagate(x: Array, s: Array, u: Array, par: Array, on_ground: bool, dt: float, Phi: Array) -> None:
-    """Advance x (>= 15,) and the shadow s (6,) in place by dt [s] under commands u, and fill Phi (15, 15).
+    """Advance x (>= 18,) and the shadow s (6,) in place by dt [s] under commands u, and fill Phi (18, 18).
 
     u (5,): elevator, aileron, rudder [rad], throttle, flap as acting on the actuators during dt.
     State by Runge-Kutta 4 (eq. 8), Phi by the matrix exponential's series to third order (eq. 6) at the start.
     On the ground the gear carries the aircraft and no such model is at hand: velocities and rates are then held, and the
     process noise (larger there) accounts for what happens.
     """
-    A = np.zeros((12, 15))
+    A = np.zeros((12, 18))
     k1, k2, k3, k4 = np.zeros(12), np.zeros(12), np.zeros(12), np.zeros(12)
     y = x.copy()
     V = math.sqrt((x[0] - x[12]) ** 2 + x[1] ** 2 + x[2] ** 2)  # along-wind only: enough for a thrust lapse
@@ -288,8 +289,8 @@ def propagate(x: Array, s: Array, u: Array, par: Array, on_ground: bool, dt: flo
     for i in range(12):
         x[i] += dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
 
-    # exp(A dt), rows of the wind being zero: I + A dt (I + A dt/2 (I + A dt/3))
-    n = 15
+    # exp(A dt), rows of wind and offsets being zero: I + A dt (I + A dt/2 (I + A dt/3))
+    n = 18
     T1 = np.zeros((12, n))
     T2 = np.zeros((12, n))
     for i in range(12):

@@ -79,10 +79,15 @@ class AircraftBelief:
         """All parameters as one array, in the order of the fields, for the kernels."""
         return np.array(astuple(self))
 
+    def aerodynamic(self) -> tuple[str, ...]:
+        """Names of derivatives and inertias, which are known less well than the mass."""
+        names = (f.name for f in fields(self))
+        return tuple(n for n in names if n.startswith(("C", "eps_", "k_", "I")) and n != "CL_flap")
+
     def perturbed(self, noise: NoiseStream, aero_sigma: float, mass_sigma: float) -> AircraftBelief:
         """A belief that is off: derivatives and inertias by `aero_sigma`, mass and lift offset by `mass_sigma` (1 sigma,
         relative), each drawn independently. Geometry, air density, thrust map and lags stay."""
-        aero = [n for n in (f.name for f in fields(self)) if n.startswith(("C", "eps_", "k_", "I")) and n != "CL_flap"]
+        aero = self.aerodynamic()
         draws = noise.normal(len(aero) + 2)
         changes = {n: getattr(self, n) * (1.0 + aero_sigma * d) for n, d in zip(aero, draws)}
         changes["mass"] = self.mass * (1.0 + mass_sigma * draws[-2])

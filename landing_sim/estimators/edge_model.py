@@ -37,9 +37,9 @@ def edge_model(
     h: Array,
     Hx: Array,
 ) -> None:
-    """Fill h (n,) [px] and Hx (n, 23) = dh/dx for n windows.
+    """Fill h (n,) [px] and Hx (n, 26) = dh/dx for n windows.
 
-    x (23,) layout of `states`; feature (n,) Feature codes; centre, direction (n, 2) [px]; pan, tilt [rad] as the encoders
+    x (26,) layout of `states`; feature (n,) Feature codes; centre, direction (n, 2) [px]; pan, tilt [rad] as the encoders
     say (their errors are part of x: reading = true + bias + noise); lever (3,) camera in body axes [m]; focal (3,) f, cx,
     cy [px].
     """

@@ -14,7 +14,7 @@ from landing_sim.types import Array
 
 @kernel
 def gyro_model(x: Array, z: Array) -> tuple[Array, Array]:
-    """Innovation (3,) and H (3, 23) of z = (p, q, r) + bias."""
+    """Innovation (3,) and H (3, 26) of z = (p, q, r) + bias."""
     nu = np.empty(3)
     Hx = np.zeros((3, N))
     for i in range(3):
@@ -26,7 +26,7 @@ def gyro_model(x: Array, z: Array) -> tuple[Array, Array]:
 
 @kernel
 def airspeed_model(x: Array, z: float) -> tuple[Array, Array]:
-    """Innovation (1,) and H (1, 23) of z = |u - R_BR w|."""
+    """Innovation (1,) and H (1, 26) of z = |u - R_BR w|."""
     Hx = np.zeros((1, N))
     R = from_euler(x[PHI], x[PHI + 1], x[PHI + 2])
     wB = R.T @ x[WX : WX + 3]

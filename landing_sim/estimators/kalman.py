@@ -232,14 +232,14 @@ def integrated_noise(Phi: Array, q: Array, dt: float, starts: Array) -> Array:
 
 
 @kernel
-def expand(Phi15: Array, index: Array, keep: Array) -> Array:
-    """Transition of the covered states (n, n): aircraft and wind (15, 15) coupled, of all others the share keep (n,)."""
-    n = index.shape[0]
+def expand(driving: Array, index: Array, keep: Array) -> Array:
+    """Transition of the covered states (n, n): states below m coupled by driving (m, m), of others the share keep (n,)."""
+    n, m = index.shape[0], driving.shape[0]
     out = np.zeros((n, n))
     for i in range(n):
         out[i, i] = keep[i]
-        if index[i] < 15:
+        if index[i] < m:
             for j in range(n):
-                if index[j] < 15:
-                    out[i, j] = Phi15[index[i], index[j]]
+                if index[j] < m:
+                    out[i, j] = driving[index[i], index[j]]
     return out

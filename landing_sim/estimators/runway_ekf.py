@@ -19,6 +19,7 @@ from landing_sim.estimators import kalman, states
 from landing_sim.estimators.aircraft_model import downwash, parameters, propagate, thrust
 from landing_sim.estimators.belief import AircraftBelief
 from landing_sim.estimators.edge_model import edge_model
+from landing_sim.estimators.gusts import change
 from landing_sim.estimators.inertial_model import airspeed_model, gyro_model
 from landing_sim.estimators.runway_filter import RAD, Blocks, FilterConfig, Memory
 from landing_sim.estimators.width import WidthFilter, rescaled
@@ -51,11 +52,14 @@ class RunwayEkf:
         self._lever = np.asarray(lever, dtype=float)
         self._width, self._slope = width, slope
         q = np.zeros(states.N)
-        q[:3] = config.q_velocity**2
+        alone = config.kind != "augmented"
+        q[:3] = np.square(config.q_velocity_alone if alone else config.q_velocity)
+        q[:3] += (config.turbulence_velocity * config.turbulence) ** 2
         q[3:6] = np.square(config.q_rates)
         q[6:9] = config.q_attitude**2
         q[9:12] = config.q_position**2
         q[12:15] = np.square(config.q_wind)
+        q[states.CX : states.CM + 1] = np.square(config.offset_drift * np.array(config.offset_sigma))
         q[states.WIDTH] = config.q_width**2
         self._keep = np.where(np.isin(self.blocks.index, (states.JPAN, states.JTILT)), 0.0, 1.0)
         self._noise_variance = np.where(self._keep == 0.0, config.encoder_noise**2, 0.0)
@@ -67,6 +71,9 @@ class RunwayEkf:
         start = q.copy()
         start[3:6] *= config.start_rates**2
         self._q = {name: d[self.blocks.index] for name, d in (("air", q), ("ground", ground), ("start", start))}
+        self._wind = None  # (n, 3) where the covariance has the wind, if turbulence is reported
+        if config.turbulence > 0.0:
+            self._wind = np.equal.outer(self.blocks.index, states.WIND).astype(float)
         self._prior = self._prior_variance()
         self._constant_Q: dict[tuple[str, int], Array] = {}
 
@@ -88,12 +95,15 @@ class RunwayEkf:
             steady = thrust(command.throttle, memory.airspeed, self._par)
             return replace(memory, t=t, shadow=np.array([*u[:3], command.flap, steady, 0.0]))
         x, shadow = memory.x.copy(), memory.shadow.copy()
-        Phi15 = np.empty((15, 15))
-        propagate(x, shadow, u, self._par, memory.on_ground, dt, Phi15)
+        driving = np.empty((states.DRIVING, states.DRIVING))
+        propagate(x, shadow, u, self._par, memory.on_ground, dt, driving)
         x[states.JPAN] = x[states.JTILT] = 0.0  # the next reading's noise is another
-        Phi = kalman.expand(Phi15, self.blocks.index, self._keep)
+        Phi = kalman.expand(driving, self.blocks.index, self._keep)
         phase = "ground" if memory.on_ground else "start" if memory.frames < self.config.start_frames else "air"
         Qd = self._process_noise(Phi, dt, phase)
+        if self._wind is not None and not memory.on_ground:
+            changes = change(x[states.H] - self._slope * x[states.X], self.config.turbulence, memory.airspeed, dt)
+            Qd = Qd + np.diag(self._wind @ changes)
         P, D = memory.P, memory.D
         if D is None:
             P = kalman.predict_dense(P, Phi, Qd, self.blocks.starts)
@@ -154,7 +164,8 @@ class RunwayEkf:
         sd[12:15] = c.wind_sigma
         if c.width == "separate":
             sd[states.WX] = 8.0  # m/s: a wrong width looks like wind along the track
-        sd[15:18] = c.gyro_bias_sigma
+        sd[states.CX : states.CM + 1] = c.offset_sigma
+        sd[states.BP : states.BR + 1] = c.gyro_bias_sigma
         sd[[states.EPAN, states.ETILT]] = c.encoder_sigma
         sd[[states.JPAN, states.JTILT]] = c.encoder_noise
         sd[states.WIDTH] = c.width_sigma
@@ -231,7 +242,7 @@ class RunwayEkf:
         return Qd
 
     def _scalars(self, memory: Memory, Hx: Array, R: Array, nu: Array) -> Memory:
-        """Update by ungated scalars; Hx (m, 23)."""
+        """Update by ungated scalars; Hx (m, 26)."""
         P, D, dx, _ = self._kalman(memory, Hx[:, self.blocks.index], R, nu, np.ones(len(nu), dtype=np.bool_))
         return replace(memory, x=self._moved(memory.x, dx), P=P, D=D)
 

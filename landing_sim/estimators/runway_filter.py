@@ -30,11 +30,16 @@ class FilterConfig:
     gyro_bias_sigma: float = 0.1 * RAD
     width_sigma: float = 4.0  # [m] prior, where width is estimated
     wind_sigma: tuple[float, float, float] = (3.0, 3.0, 1.0)  # [m/s] prior
-    q_velocity: float = 0.15  # [m/s^2]
+    q_velocity: tuple[float, float, float] = (0.05, 0.04, 0.05)  # [m/s^2]
+    q_velocity_alone: float = 0.15  # where wind and offsets are no states and act as noise
     q_rates: tuple[float, float, float] = (1.5 * RAD, 1.0 * RAD, 1.0 * RAD)  # [rad/s^2]
     q_attitude: float = 0.02 * RAD
     q_position: float = 0.02
-    q_wind: tuple[float, float, float] = (0.5, 0.6, 0.5)  # gusts must reach the airspeed that is flown
+    q_wind: tuple[float, float, float] = (0.4, 0.25, 0.2)  # in air that no turbulence is reported for
+    turbulence: float = 0.0  # [m/s] wind at 20 ft that the reported turbulence goes with
+    turbulence_velocity: float = 0.02  # [1/sqrt(s)] times that, added to q_velocity: gusts within a cycle
+    offset_sigma: tuple[float, float, float] = (0.006, 0.045, 0.02)  # coefficients X, Z, m; see mismatch.py
+    offset_drift: float = 0.05  # share of that by which they wander, per sqrt(s): with the speed they change
     q_width: float = 0.0
     q_ground_velocity: float = 2.0  # on the wheels
     q_ground_rates: float = 6.0 * RAD
@@ -55,7 +60,7 @@ class Memory:
 
     t: float
     valid: bool
-    x: Array  # (23,)
+    x: Array  # (26,)
     shadow: Array  # (6,) believed actuators, flap, thrust, delayed downwash
     P: Array  # (n, n) covariance, or U where D is given
     D: Array | None
@@ -89,7 +94,7 @@ class Blocks:
             wind: tuple[int, ...] = states.WIND
             if config.width == "state":
                 wind = wind[1:]  # along-track wind and width scale the scene alike: not both
-            groups = [states.PAPER + wind + states.GYRO_BIAS + states.ENCODER]
+            groups = [states.PAPER + wind + states.OFFSET + states.GYRO_BIAS + states.ENCODER]
         if config.width == "state":
             groups[0] += (states.WIDTH,)
         bounds = np.cumsum([0] + [len(g) for g in groups])

@@ -45,7 +45,7 @@ class WidthFilter:
 def rescaled(x: Array, factor: float) -> Array:
     """The state seen in a world larger by `factor`: lengths and ground speed grow, what the air data say stays.
 
-    x (23,); the wind along the way takes up the difference in speed.
+    x (26,); the wind along the way takes up the difference in speed.
     """
     out = x.copy()
     out[SCALED] *= factor

@@ -10,6 +10,7 @@ import numpy as np
 
 from landing_sim.control.design import Design, LinearModel, design
 from landing_sim.control.settings import ControlSettings
+from landing_sim.estimators.mismatch import offset_sigma
 from landing_sim.estimators.observer.gibert import Gibert, GibertConfig
 from landing_sim.estimators.observer.kinematic_ekf import EkfConfig, KinematicEkf
 from landing_sim.estimators.observer.looking import Ranging
@@ -96,6 +97,8 @@ def estimator(scenario: Scenario, vehicle: Vehicle, camera: BelievedCamera, nois
     f, b = scenario.filter, scenario.believed
     if f.kind == "observer":
         return _late(scenario, range_observer(scenario, camera))
+    believed = replace(vehicle.believed, rho=_air_density(scenario), mass=vehicle.mass_kg)
+    flap = control_settings(scenario, vehicle).flap
     config = FilterConfig(
         kind=f.kind,
         factorisation=f.factorisation,
@@ -106,8 +109,9 @@ def estimator(scenario: Scenario, vehicle: Vehicle, camera: BelievedCamera, nois
         encoder_sigma=math.radians(b.encoder_sigma_deg),
         encoder_noise=math.radians(scenario.camera.platform.encoder_noise_deg),
         gyro_bias_sigma=math.radians(scenario.sensors.gyro.bias_dps),
+        turbulence=_reported_turbulence(scenario),
+        offset_sigma=offset_sigma(believed, vehicle.guidance.path.approach_mps, flap, b.aero_sigma, b.mass_sigma),
     )
-    believed = replace(vehicle.believed, rho=_air_density(scenario), mass=vehicle.mass_kg)
     ekf = RunwayEkf(
         config,
         believed.perturbed(noise, b.aero_sigma, b.mass_sigma),
@@ -137,6 +141,12 @@ def _late(scenario: Scenario, estimator: Estimator) -> Estimator:
     if latency > 0.0 and scenario.filter.compensate_latency:
         return Rewind(estimator, latency + 2.0 * scenario.time.cycle_s)
     return estimator
+
+
+def _reported_turbulence(scenario: Scenario) -> float:
+    """[m/s] wind at 20 ft: the report is right unless the scenario says otherwise."""
+    reported, actual = scenario.believed.turbulence_mps, scenario.wind.turbulence
+    return reported if reported is not None else 0.0 if actual is None else truth.wind_20ft(actual)
 
 
 def _airspeed_sigma(scenario: Scenario) -> float:

@@ -14,6 +14,7 @@ from landing_sim.interfaces import Sensor
 from landing_sim.noise import Noise
 from landing_sim.plants.aircraft import InitialState, JsbsimPlant
 from landing_sim.scenario import Scenario
+from landing_sim.scenario import Turbulence as WantedTurbulence
 from landing_sim.sensors.airdata import Airspeed, AirspeedConfig, FlowAngles, FlowAnglesConfig
 from landing_sim.sensors.camera import Camera, Encoders
 from landing_sim.sensors.inertial import Gyro, GyroConfig
@@ -40,14 +41,18 @@ def runway(scenario: Scenario) -> Runway:
     )
 
 
+def wind_20ft(turbulence: WantedTurbulence) -> float:
+    """[m/s] that its severity stands for."""
+    return (turbulence.wind_at_20ft_mps or 0.0) if turbulence.severity is None else W20[turbulence.severity]
+
+
 def wind(scenario: Scenario, noise: Noise) -> Wind:
     """All that moves the air."""
     w = scenario.wind
     everywhere = w.crosswind_from_x_m is None
     turbulence = None
     if w.turbulence is not None:
-        t = w.turbulence
-        turbulence = Turbulence((t.wind_at_20ft_mps or 0.0) if t.severity is None else W20[t.severity])
+        turbulence = Turbulence(wind_20ft(w.turbulence))
     config = WindConfig(
         steady=SteadyWind(w.headwind_mps, w.crosswind_mps if everywhere else 0.0),
         step=None if w.crosswind_from_x_m is None else CrosswindStep(w.crosswind_from_x_m, w.crosswind_mps),
