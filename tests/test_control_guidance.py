@@ -214,6 +214,70 @@ def test_a_bounce_is_flared_again_from_where_it_is() -> None:
     assert down.mode == "rollout"
 
 
+def test_a_bounce_that_does_not_come_down_is_seen_as_too_high() -> None:
+    """2 s at 1.5 m under the wheels: the flare, from 4.5 m over its aim, is then at 4.5 exp(-86 / 424) - 3 m."""
+    guidance = LandingGuidance(SETTINGS)
+    memory = GuidanceMemory("rollout", t=0.0, seen=0.0)
+    for i in range(3):
+        floating = estimate(1.0 + i, x=500.0, H=3.3, u=43.0, flags={"on_ground": False})
+        memory, reference = guidance.step(memory, floating)
+    wanted = 4.5 * math.exp(-2.0 * 43.0 / guidance.path.length)
+    assert reference.height - floating["H"] == pytest.approx(wanted - 3.0 - 1.5)
+    assert reference.climb_rate == pytest.approx(-43.0 * wanted / guidance.path.length)
+    assert reference.extra["on_path"] == 1.0
+
+
+# --------------------------------------------------------------------------------------------------- range not known
+
+
+def unranged(t: float, known: bool = False, **values: float) -> Estimate:
+    state = {"x": -3000.0, "H": 150.0, "y": 60.0, "psi": 0.1, **values}
+    return estimate(t, flags={"range_valid": known}, **state)
+
+
+def test_without_a_range_it_flies_straight_on_down() -> None:
+    guidance = LandingGuidance(SETTINGS)
+    memory, reference = fly(guidance, guidance.init(), unranged(0.0), unranged(0.06, psi=0.12, H=149.0, y=61.0))
+    assert (reference.mode, reference.airspeed, reference.phi, reference.r_ff) == ("hold", 50.0, 0.0, 0.0)
+    assert reference.psi == 0.1  # as it began
+    assert (reference.height, reference.y) == (149.0, 61.0)  # no place to steer for
+    assert reference.climb_rate == pytest.approx(-50.0 * math.tan(math.radians(2.7)))
+    assert reference.extra["on_path"] == 0.0  # nothing is integrated
+    memory, reference = guidance.step(memory, unranged(0.12, known=True))
+    assert reference.mode == "capture"
+    memory, reference = guidance.step(memory, unranged(0.18))
+    assert reference.mode == "capture"  # never again
+
+
+def test_a_known_range_is_not_waited_for() -> None:
+    guidance = LandingGuidance(SETTINGS)
+    assert guidance.step(guidance.init(), unranged(0.0, known=True))[1].mode == "capture"
+    assert guidance.step(guidance.init(), estimate(0.0))[1].mode == "glide"
+
+
+@pytest.mark.parametrize(("step", "values", "expected"), [(0.5, {}, 40.0), (0.5, {"H": 61.0}, 0.0)])
+def test_a_range_that_never_comes_ends_in_a_climb(step: float, values: dict[str, float], expected: float) -> None:
+    """After 40 s, or below 60 m."""
+    guidance = LandingGuidance(SETTINGS)
+    memory, t = guidance.init(), 0.0
+    while t < 60.0:
+        memory, reference = guidance.step(memory, unranged(t, **values))
+        if reference.mode == "go_around":
+            break
+        t += step
+    assert t == pytest.approx(expected, abs=1.0)
+    memory, reference = guidance.step(memory, unranged(t + step, known=True))
+    assert reference.mode == "go_around"
+
+
+def test_holding_blind_goes_around() -> None:
+    guidance = LandingGuidance(SETTINGS)
+    memory, _ = guidance.step(guidance.init(), unranged(0.0))
+    memory, still = guidance.step(memory, replace(unranged(2.9), valid=False))
+    memory, gone = guidance.step(memory, replace(unranged(3.1), valid=False))
+    assert (still.mode, gone.mode) == ("hold", "go_around")
+
+
 def test_long_blackout_goes_around_but_not_below_decision_height() -> None:
     guidance = LandingGuidance(SETTINGS)
     for x, expected in ((-400.0, "go_around"), (100.0, "flare")):

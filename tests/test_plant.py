@@ -254,6 +254,23 @@ def test_a_wheel_pushes_where_it_touches() -> None:
     np.testing.assert_allclose(out[3:], np.cross([0.60, 1.76, 1.70], force), rtol=1e-9)
 
 
+@pytest.mark.parametrize("sideways", [0.5, 6.0])
+def test_a_tyre_that_slips_keeps_pushing_the_same_way(sideways: float) -> None:
+    """Rolling at 60 m/s: cornering stiffness k_t sigma while it grips, the limit of grip beyond; never to and fro."""
+    c = read_contacts(DO128 / "do128.xml", np.array([0.532, 0.0, 0.0]))
+    height, out, bristle = np.array([-0.1, 1.0, 1.0, 1.0, 1.0, 1.0]), np.empty(6), np.zeros((6, 2))
+    pushes = []
+    for _ in range(200):
+        reactions(
+            np.eye(3), np.array([60.0, sideways, 0.0]), np.zeros(3), 0.0, 0.0, 0.0, 0.005, c.p_B, c.values, height,
+            bristle, out,
+        )  # fmt: skip
+        pushes.append(out[1])
+    grip = 18e3 * math.sqrt(0.8**2 - 0.02**2)
+    assert max(pushes) < 0.0
+    assert pushes[-1] == pytest.approx(-min(1.5 * 180e3 * 0.35 * sideways / 60.0, grip), rel=1e-3)
+
+
 def test_contacts_are_read_in_their_order() -> None:
     contacts = read_contacts(DO128 / "do128.xml", np.array([0.532, 0.0, 0.0]))
     assert contacts.names[:3] == ("LEFT_MAIN", "RIGHT_MAIN", "TAIL")

@@ -205,7 +205,7 @@ class FlightModel:
             write(value)
 
     def stabilise(self, angle: float) -> None:
-        """Set the stabiliser [rad], as the elevator angle worth as much. Raises PlantError beyond its range, or if there is none."""
+        """Set the stabiliser [rad], as the elevator angle worth as much. Raises PlantError beyond its range."""
         low, high = self.stabiliser_limits or (-math.inf, math.inf)
         if not low - 1e-3 <= angle <= high + 1e-3:  # differences are taken across the ends
             raise PlantError(f"stabiliser {angle:g} rad is beyond its {low:g} ... {high:g} rad")
