@@ -364,7 +364,7 @@ def test_approach_speed_by_hand() -> None:
     assert knots(planned(150e3)) == pytest.approx(119.0 * math.sqrt(150.0 / 140.0) + 5.0, abs=1e-9)
     assert knots(planned(120e3)) == pytest.approx(123.0)
     assert knots(planned(150e3, 30.0)) == pytest.approx(knots(planned(150e3)) + 5.0, abs=0.01)
-    assert knots(planned(150e3, -10.0)) == knots(planned(150e3))
+    assert knots(planned(150e3, -30.0)) == knots(planned(150e3))
     assert knots(planned(150e3, density=1.0)) == pytest.approx(knots(planned(150e3)) * math.sqrt(1.225))
     heavy = planned(180e3)
     assert heavy.mass_kg == 180e3
