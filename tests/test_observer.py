@@ -168,7 +168,7 @@ def own(s: Array) -> Array:
 
 
 def test_the_filters_transition_against_differences() -> None:
-    ekf = KinematicEkf(EkfConfig(q_position=0.0, q_course=0.0, q_camera=0.0, q_bias=0.0), LENS)
+    ekf = KinematicEkf(EkfConfig(q_position=0.0, q_course=0.0, q_camera=0.0, q_edge=0.0, q_bias=0.0), LENS)
     s = scene_at(np.array([-3000.0, 40.0, -160.0]), 45.0)
     s[sc.BX :] = 0.3, -0.2, 0.1
     way = np.array([2.8, 0.1, 0.15])

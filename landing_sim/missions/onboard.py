@@ -131,8 +131,16 @@ def range_observer(scenario: Scenario, camera: BelievedCamera) -> RunwayObserver
         config = GibertConfig(outputs=o.outputs, attitude=o.attitude, bandwidth=o.bandwidth_rps)
         ranging = Gibert(config, camera.intrinsics)
     else:
-        ranging = KinematicEkf(EkfConfig(attitude=o.attitude), camera.intrinsics)
+        ranging = KinematicEkf(
+            EkfConfig(attitude=o.attitude, attitude_noise=_attitude_noise(scenario)), camera.intrinsics
+        )
     return RunwayObserver(ObserverConfig(o.first_range_m, o.trust_percent / 100.0), ranging, NOMINAL_WIDTH, lever)
+
+
+def _attitude_noise(scenario: Scenario) -> float:
+    """[rad] of the camera's attitude in each image: inertial unit and encoders together."""
+    unit, platform = scenario.sensors.inertial, scenario.camera.platform
+    return math.radians(max(math.hypot(unit.attitude_noise_deg, platform.encoder_noise_deg), 1e-3))
 
 
 def _late(scenario: Scenario, estimator: Estimator) -> Estimator:

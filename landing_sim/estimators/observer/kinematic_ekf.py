@@ -50,7 +50,10 @@ class EkfConfig:
     q_position: float = 0.03  # [m]
     q_course: float = 0.003 * RAD
     q_camera: float = 0.001 * RAD
+    q_edge: float = 0.02  # [px]
     q_bias: float = 0.01  # [m/s]
+    edge_floor: float = 0.2  # [px] of each window: what is wrong with it stays so for many images
+    edge_sigma: float = 0.1  # [px] prior of what paint and blur move all windows of a feature by
     velocity_sigma: float = 0.5  # [m/s] prior of the inertial velocity's bias, each axis
     attitude_noise: float = 0.01 * RAD  # of each image, common to all its edges
     gate_sigma: float = 5.0
@@ -68,6 +71,7 @@ class KinematicEkf:
         self._q = np.zeros(sc.N)
         self._q[sc.COURSE] = c.q_course**2
         self._q[[sc.EPAN, sc.ETILT, sc.EROLL]] = c.q_camera**2
+        self._q[[sc.SIDE, sc.NEAR]] = c.q_edge**2
         self._q[sc.BX :] = c.q_bias**2
 
     def start(self, s: Array, P: Array, t: float) -> Scene:
@@ -76,6 +80,7 @@ class KinematicEkf:
         own[XI, :] *= mu
         own[:, XI] *= mu
         own[MU, MU] = (c.first_spread * mu) ** 2
+        own[sc.SIDE, sc.SIDE] = own[sc.NEAR, sc.NEAR] = c.edge_sigma**2
         own[sc.BX :, sc.BX :] = np.eye(3) * c.velocity_sigma**2
         return self._scene(Scene(s, P, c.first_spread, t), s, own)
 
@@ -113,6 +118,9 @@ class KinematicEkf:
         Hn[:, sc.COURSE] *= -1.0
         Hn[:, XI] *= W
         Hn[:, MU] = 0.0  # a scene scaled looks the same
+        borders, threshold = edges.feature <= Feature.RIGHT, edges.feature == Feature.THRESHOLD
+        Hn[borders, sc.SIDE] = Hn[threshold, sc.NEAR] = 1.0
+        h += Hn[:, sc.SIDE] * scene.s[sc.SIDE] + Hn[:, sc.NEAR] * scene.s[sc.NEAR]
         # the attitude's own noise is new in every image and moves all its windows together: three states of this image
         Hn[:, sc.N :] = Hx[:, states.PHI : states.PSI + 1] * c.attitude_noise
         P = np.zeros((sc.N + 3, sc.N + 3))
@@ -123,7 +131,7 @@ class KinematicEkf:
             found = found & (edges.feature != Feature.HORIZON)
         nu = np.where(found, m.z - h, 0.0)
         use: np.ndarray = found & np.isfinite(nu)
-        R = np.where(found, m.R, 1.0)
+        R = np.where(found, m.R + c.edge_floor**2, 1.0)
         status = edges.status.copy()
         s2 = kalman.innovation_variance(P, Hn, R)
         if scene.frames >= c.start_frames:

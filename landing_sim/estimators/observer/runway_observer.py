@@ -19,6 +19,7 @@ import numpy as np
 from landing_sim.estimators.observer import scene as sc
 from landing_sim.estimators.observer.looking import Image, Ranging
 from landing_sim.estimators.observer.scene import Scene, carriage
+from landing_sim.geometry.runway_image import horizon_dip
 from landing_sim.geometry.so3 import from_euler, to_euler, wrap
 from landing_sim.signals import Command, Estimate, Measurement
 from landing_sim.types import Array
@@ -42,7 +43,9 @@ class ObserverConfig:
 
     first_range: float | None = None
     trust: float = 0.1
+    first_spread: float = 0.6  # relative, of the first guess
     wind_filter: float = 1.0  # [s]
+    pose_factor: float = 4.0  # an acquired pose is as much worse than its covariance says, far out
     camera_sigma: float = 0.3 * RAD  # of its mounting
     lost_after: int = 30  # images that showed nothing
 
@@ -169,7 +172,11 @@ class RunwayObserver:
         L = np.zeros((sc.N, 6))
         L[sc.X, 0] = L[sc.Y, 1] = L[sc.H, 2] = factor
         L[sc.EROLL, 3], L[sc.ETILT, 4], L[sc.COURSE, 5] = 1.0, -1.0, -1.0
-        P = L @ m.R @ L.T
+        P = c.pose_factor**2 * (L @ m.R @ L.T)
+        # pitch came from the horizon, whose dip was taken for a height that is as uncertain as the scale
+        dipped = np.zeros(sc.N)
+        dipped[sc.ETILT], dipped[sc.H] = 1.0, abs(s[sc.X])
+        P += (0.5 * c.first_spread * horizon_dip(float(camera[2]))) ** 2 * np.outer(dipped, dipped)
         P[sc.EPAN, sc.EPAN] = c.camera_sigma**2
         P[sc.COURSE, sc.COURSE] += c.camera_sigma**2
         P[sc.COURSE, sc.EPAN] = P[sc.EPAN, sc.COURSE] = -(c.camera_sigma**2)
