@@ -25,7 +25,7 @@ RUNWAY = {"width_m": 29.0, "length_m": 1680.0}
 
 
 def build(steps, **arguments) -> FlightLog:
-    builder = LogBuilder(capacity=16)
+    builder = LogBuilder()
     for step in steps:
         builder.add(step)
     return builder.finish(**{"runway": RUNWAY, "touchdown": synthetic.touchdown(), "seed": 1} | arguments)

@@ -9,14 +9,30 @@ It holds no clock, host or path. parquet.py stores it.
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib import metadata
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
-from landing_sim.signals import CameraSample, EdgeSet, Feature, Residuals, Status, Step, Touchdown
+from landing_sim.signals import (
+    CameraSample,
+    CameraTruth,
+    Command,
+    EdgeSet,
+    Estimate,
+    Feature,
+    Reference,
+    Residuals,
+    Status,
+    Step,
+    Touchdown,
+    Truth,
+)
 from landing_sim.types import Array
 
 SCHEMA = 1
@@ -59,7 +75,8 @@ _AT = {name: i for i, name in enumerate(_FIXED)}
 _P, _V, _W, _E = _AT["true_x_m"], _AT["true_vx_mps"], _AT["true_p_radps"], _AT["true_phi_rad"]
 _A, _S, _G = _AT["true_wx_mps"], _AT["true_elevator_rad"], _AT["true_wheel_left_m"]
 _ON, _C, _U, _R = _AT["true_ground_left"], _AT["true_camera_x_m"], _AT["cmd_elevator_rad"], _AT["ref_airspeed_mps"]
-_M, _N = _AT["meas_p_radps"], _AT["nis"]
+_M = _AT["meas_p_radps"]
+_NO_GYRO = np.full(3, np.nan)
 
 
 class LogError(ValueError):
@@ -114,72 +131,46 @@ class FlightLog:
 
 @dataclass(slots=True)
 class LogBuilder:
-    """Collects steps while the simulation runs; a step costs a few microseconds."""
+    """Keeps what steps hold, which are values, but no image; columns are made at the end, all rows at once."""
 
-    capacity: int = 1024
-    _n: int = 0
-    _rows: Array = field(init=False)
-    _names: tuple[str, ...] = ()
-    _mean: Array = field(init=False)
-    _cov: Array = field(init=False)
-    _valid: list[bool] = field(default_factory=list)
-    _modes: list[str] = field(default_factory=list)
-    _extras: list[Mapping[str, float]] = field(default_factory=list)
-    _flags: list[Mapping[str, bool]] = field(default_factory=list)
-    _rotations: list[np.ndarray] = field(default_factory=list)
+    _truth: list[Truth] = field(default_factory=list)
+    _camera: list[CameraTruth] = field(default_factory=list)
+    _estimate: list[Estimate] = field(default_factory=list)
+    _reference: list[Reference] = field(default_factory=list)
+    _command: list[Command] = field(default_factory=list)
+    _gyro: list[Array] = field(default_factory=list)
+    _other: list[tuple[float, ...]] = field(default_factory=list)  # airspeed, pan, tilt, frame, nis, its dof
     _edges: list[tuple[int, EdgeSet, Array, Residuals | None]] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self._rows = np.full((self.capacity, len(_FIXED)), np.nan)
 
     def add(self, step: Step) -> None:
         """One cycle. Raises LogError if the estimate's names change after the first step."""
-        k = self._n
-        if k == len(self._rows):
-            self._grow()
-        truth, estimate, command, reference = step.truth, step.estimate, step.command, step.reference
-        row = self._rows[k]
-        row[0], row[1] = truth.t, estimate.t
-        row[_P : _P + 3] = truth.p_RB
-        row[_V : _V + 3] = truth.v_RB_R
-        row[_W : _W + 3] = truth.w_RB_B
-        row[_E : _E + 3] = truth.euler
-        row[_A : _A + 3] = truth.wind_R
-        row[_A + 3], row[_A + 4], row[_A + 5] = truth.airspeed, truth.alpha, truth.beta
-        row[_S : _S + 4] = truth.surfaces
-        row[_S + 4] = truth.thrust
-        row[_G : _G + 3] = truth.wheels_height
-        row[_ON : _ON + 3] = truth.on_ground
-        row[_ON + 3] = truth.load_factor
-        row[_C : _C + 3] = step.camera.p_RC
-        row[_C + 3], row[_C + 4] = step.camera.pan, step.camera.tilt
-        row[_U : _U + 5] = command.elevator, command.aileron, command.rudder, command.throttle, command.flap
-        row[_U + 5 : _U + 9] = command.brake_left, command.brake_right, command.pan, command.tilt
-        row[_R : _R + 4] = reference.airspeed, reference.height, reference.climb_rate, reference.y
-        row[_R + 4 : _R + 8] = reference.psi, reference.phi, reference.theta_ff, reference.r_ff
+        names = step.estimate.names
+        if self._estimate and names is not self._estimate[0].names and names != self._estimate[0].names:
+            raise LogError(f"the estimate's names changed in flight from {self._estimate[0].names} to {names}")
+        gyro, airspeed, pan, tilt, frame = _NO_GYRO, math.nan, math.nan, math.nan, math.nan
         for sample in step.samples:
+            data = sample.data
             if sample.sensor == "gyro":
-                row[_M : _M + 3] = sample.data
+                gyro = data
             elif sample.sensor == "airspeed":
-                row[_M + 3] = sample.data
-            elif isinstance(sample.data, CameraSample):
-                row[_M + 4 : _M + 7] = sample.data.pan, sample.data.tilt, sample.data.index
+                airspeed = data
+            elif isinstance(data, CameraSample):
+                pan, tilt, frame = data.pan, data.tilt, data.index
         seen = step.residuals
-        row[_N], row[_N + 1] = (np.nan, 0.0) if seen is None else (seen.nis, seen.dof)
-        if estimate.names != self._names:
-            self._start(estimate.names)
-        self._mean[k] = estimate.mean
-        if estimate.cov is not None:
-            self._cov[k] = estimate.cov
-        self._valid.append(estimate.valid)
-        self._modes.append(reference.mode)
-        self._extras.append(reference.extra)
-        self._flags.append(estimate.flags)
-        self._rotations.append(truth.R_RB)
         for measurement in step.measurements:
             if measurement.geometry is not None:
-                self._edges.append((k, measurement.geometry, measurement.z, seen))
-        self._n = k + 1
+                self._edges.append((len(self._truth), measurement.geometry, measurement.z, seen))
+        self._gyro.append(gyro)
+        self._other.append(
+            (airspeed, pan, tilt, frame, math.nan, 0.0)
+            if seen is None
+            else (airspeed, pan, tilt, frame, seen.nis, seen.dof)
+        )
+        self._truth.append(step.truth)
+        self._camera.append(step.camera)
+        self._estimate.append(step.estimate)
+        self._reference.append(step.reference)
+        self._command.append(step.command)
 
     def finish(
         self,
@@ -196,29 +187,34 @@ class LogBuilder:
         end : why the loop stopped, as the mission says ("stopped", "time", "numeric_error", ...)
         runway : true width_m, length_m: what the judge needs to say "off the runway"
         """
-        n = self._n
+        n = len(self._truth)
         if n == 0:
             raise LogError("no step was logged: the flight ended before its first control cycle")
-        columns: dict[str, np.ndarray] = {name: self._rows[:n, i].copy() for i, name in enumerate(_FIXED)}
+        rows, names = self._fixed(), self._estimate[0].names
+        columns: dict[str, np.ndarray] = {name: rows[:, i].copy() for i, name in enumerate(_FIXED)}
         for name in ("true_ground_left", "true_ground_right", "true_ground_third"):
             columns[name] = columns[name] > 0.5
         for name in ("nis_dof", "meas_frame"):
             columns[name] = np.nan_to_num(columns[name], nan=-1.0).astype(np.int64)
         columns["true_H_m"] = -columns["true_z_m"]
-        R_RB = np.stack(self._rotations)
-        uvw = np.einsum("nji,nj->ni", R_RB, self._rows[:n, _V : _V + 3])  # R_BR v_R
+        R_RB = np.concatenate([truth.R_RB for truth in self._truth]).reshape(n, 3, 3)
+        uvw = np.einsum("nji,nj->ni", R_RB, rows[:, _V : _V + 3])  # R_BR v_R
         for i, name in enumerate(("u", "v", "w")):
             columns[f"true_{name}_mps"] = uvw[:, i]
         columns["true_groundspeed_mps"] = np.hypot(columns["true_vx_mps"], columns["true_vy_mps"])
-        columns["mode"] = np.array(self._modes)
-        columns["valid"] = np.array(self._valid)
-        for i, name in enumerate(self._names):
-            columns[f"est_{_with_unit(name)}"] = np.where(columns["valid"], self._mean[:n, i], np.nan)
-            variance = np.where(columns["valid"], self._cov[:n, i, i], np.nan)
+        columns["mode"] = np.array([reference.mode for reference in self._reference])
+        columns["valid"] = np.array([estimate.valid for estimate in self._estimate])
+        mean = np.concatenate([estimate.mean for estimate in self._estimate]).reshape(n, -1)
+        cov = self._covariances(len(names))
+        for i, name in enumerate(names):
+            columns[f"est_{_with_unit(name)}"] = np.where(columns["valid"], mean[:, i], np.nan)
+            variance = np.where(columns["valid"], cov[:, i, i], np.nan)
             columns[f"sd_{_with_unit(name)}"] = np.sqrt(np.maximum(variance, 0.0))
-        for prefix, rows in (("ref", self._extras), ("flag", self._flags)):
-            for key in sorted({key for row in rows for key in row}):
-                columns[f"{prefix}_{key}"] = np.array([float(row.get(key, np.nan)) for row in rows])
+        extras = [reference.extra for reference in self._reference]
+        flags = [estimate.flags for estimate in self._estimate]
+        for prefix, told in (("ref", extras), ("flag", flags)):
+            for key in sorted(set().union(*told)):
+                columns[f"{prefix}_{key}"] = np.array([told_now.get(key, np.nan) for told_now in told], dtype=float)
         for name in [name for name in columns if name.startswith("flag_")]:
             columns[name] = columns[name] == 1.0
         columns |= self._windows(n)
@@ -234,21 +230,51 @@ class LogBuilder:
             **(extra or {}),
         }
         log = FlightLog(columns, meta)
-        columns["nees"], columns["nees_dof"] = self._nees(log)
+        columns["nees"], columns["nees_dof"] = _nees(log, names, cov)
         return log
 
-    def _start(self, names: tuple[str, ...]) -> None:
-        if self._names:
-            raise LogError(f"the estimate's names changed in flight from {self._names} to {names}")
-        self._names = names
-        self._mean = np.full((len(self._rows), len(names)), np.nan)
-        self._cov = np.full((len(self._rows), len(names), len(names)), np.nan)
+    def _fixed(self) -> Array:
+        """(n, len(_FIXED))"""
+        truth, camera, command, reference = self._truth, self._camera, self._command, self._reference
+        rows = np.empty((len(truth), len(_FIXED)))
 
-    def _grow(self) -> None:
-        def doubled(a: Array) -> Array:
-            return np.concatenate([a, np.full_like(a, np.nan)])
+        def vectors(at: int, values: Sequence[Array]) -> None:
+            """Columns from `at` on; one small array a cycle."""
+            rows[:, at : at + len(values[0])] = np.concatenate(values).reshape(len(values), -1)
 
-        self._rows, self._mean, self._cov = doubled(self._rows), doubled(self._mean), doubled(self._cov)
+        def scalars(at: int, values: Iterable[tuple[float, ...]]) -> None:
+            block = np.fromiter(chain.from_iterable(values), float).reshape(len(rows), -1)
+            rows[:, at : at + block.shape[1]] = block
+
+        scalars(0, ((now.t, estimate.t) for now, estimate in zip(truth, self._estimate)))
+        vectors(_P, [now.p_RB for now in truth])
+        vectors(_V, [now.v_RB_R for now in truth])
+        vectors(_W, [now.w_RB_B for now in truth])
+        vectors(_E, [now.euler for now in truth])
+        vectors(_A, [now.wind_R for now in truth])
+        scalars(_A + 3, ((now.airspeed, now.alpha, now.beta) for now in truth))
+        vectors(_S, [now.surfaces for now in truth])
+        scalars(_S + 4, ((now.thrust,) for now in truth))
+        vectors(_G, [now.wheels_height for now in truth])
+        vectors(_ON, [now.on_ground for now in truth])
+        scalars(_ON + 3, ((now.load_factor,) for now in truth))
+        vectors(_C, [c.p_RC for c in camera])
+        scalars(_C + 3, ((c.pan, c.tilt) for c in camera))
+        scalars(_U, ((c.elevator, c.aileron, c.rudder, c.throttle, c.flap) for c in command))
+        scalars(_U + 5, ((c.brake_left, c.brake_right, c.pan, c.tilt) for c in command))
+        scalars(_R, ((r.airspeed, r.height, r.climb_rate, r.y) for r in reference))
+        scalars(_R + 4, ((r.psi, r.phi, r.theta_ff, r.r_ff) for r in reference))
+        vectors(_M, self._gyro)
+        scalars(_M + 3, self._other)
+        return rows
+
+    def _covariances(self, m: int) -> Array:
+        """(n, m, m), NaN where the estimate has none."""
+        cov = np.full((len(self._estimate), m, m), np.nan)
+        known = [k for k, estimate in enumerate(self._estimate) if estimate.cov is not None]
+        if known:
+            cov[known] = np.concatenate([self._estimate[k].cov for k in known]).reshape(-1, m, m)
+        return cov
 
     def _windows(self, n: int) -> dict[str, np.ndarray]:
         m = max((len(z) for _, _, z, _ in self._edges), default=0)
@@ -259,12 +285,22 @@ class LogBuilder:
         uv = np.full((n, m, 2), np.nan)
         z = np.full((n, m), np.nan)
         innovation = np.full((n, m), np.nan)
-        for k, edges, z_k, seen in self._edges:
-            count = len(z_k)
-            feature[k, :count], status[k, :count] = edges.feature, edges.status
-            uv[k, :count], z[k, :count] = edges.centre, z_k
-            if seen is not None and len(seen.status) == count:
-                status[k, :count], innovation[k, :count] = seen.status, seen.innovation
+        found = [edges for _, edges, _, _ in self._edges]
+        counts = np.array([len(z_k) for _, _, z_k, _ in self._edges])
+        row = np.repeat([k for k, _, _, _ in self._edges], counts)
+        column = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+        # the estimator's verdict, where it is about these windows
+        judged = [
+            seen if seen is not None and len(seen.status) == len(z_k) else None for _, _, z_k, seen in self._edges
+        ]
+        nothing = np.full(m, np.nan)
+        feature[row, column] = np.concatenate([edges.feature for edges in found])
+        uv[row, column] = np.concatenate([edges.centre for edges in found])
+        z[row, column] = np.concatenate([z_k for _, _, z_k, _ in self._edges])
+        status[row, column] = np.concatenate([e.status if j is None else j.status for e, j in zip(found, judged)])
+        innovation[row, column] = np.concatenate(
+            [nothing[:count] if j is None else j.innovation for count, j in zip(counts, judged)]
+        )
         return {
             "window_feature": feature,
             "window_status": status,
@@ -275,21 +311,24 @@ class LogBuilder:
             "threshold_found": ((feature == Feature.THRESHOLD) & (status == Status.FOUND)).any(axis=1),
         }
 
-    def _nees(self, log: FlightLog) -> tuple[Array, np.ndarray]:
-        """Squared error normalised by the covariance, over the rigid-body states the filter has; divide by its dof."""
-        names = [name for name in RIGID if name in self._names]
-        index = [self._names.index(name) for name in names]
-        dof = np.full(len(log), len(index), np.int64)
-        nees = np.full(len(log), np.nan)
-        if index:
-            error = np.column_stack([log.error(name) for name in names])
-            for k in np.flatnonzero(np.isfinite(error).all(axis=1)):
-                P = self._cov[k][np.ix_(index, index)]
-                try:
-                    nees[k] = error[k] @ np.linalg.solve(P, error[k])
-                except np.linalg.LinAlgError:  # a state pinned by the filter has no variance: no number for this row
-                    continue
-        return nees, dof
+
+def _nees(log: FlightLog, names: tuple[str, ...], cov: Array) -> tuple[Array, np.ndarray]:
+    """Squared error normalised by the covariance, over the rigid-body states the filter has; divide by its dof."""
+    known = [name for name in RIGID if name in names]
+    index = [names.index(name) for name in known]
+    dof = np.full(len(log), len(index), np.int64)
+    nees = np.full(len(log), np.nan)
+    if index:
+        error = np.column_stack([log.error(name) for name in known])
+        use = np.flatnonzero(np.isfinite(error).all(axis=1))
+        e, P = error[use], cov[use][:, index][:, :, index]
+        try:
+            nees[use] = np.einsum("ni,ni->n", e, np.linalg.solve(P, e[:, :, None])[:, :, 0])
+        except np.linalg.LinAlgError:  # a state pinned by the filter has no variance: no number for such rows
+            for k, e_k, P_k in zip(use, e, P):
+                with suppress(np.linalg.LinAlgError):
+                    nees[k] = e_k @ np.linalg.solve(P_k, e_k)
+    return nees, dof
 
 
 def _with_unit(name: str) -> str:

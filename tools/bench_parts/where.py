@@ -1,4 +1,7 @@
-"""Where the time goes: one flight with a stop watch (CPU time) on every part, its own cost taken off.
+"""Where the time goes: one flight with a stop watch on every part, its own cost taken off.
+
+The stop watch reads wall time, since reading CPU time is a call into the kernel and as dear as many a part. What the
+machine did meanwhile for others is taken off by the flight's CPU time as a whole: every part by the same factor.
 
 Each part is charged for itself alone: rendering a window while the front end looks at it is the renderer's.
 """
@@ -34,11 +37,11 @@ class StopWatch:
 
     def start(self) -> None:
         self._stack[:] = [LOOP]
-        self._since = time.thread_time()
+        self._since = time.perf_counter()
 
     def on(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
         """`function`, charged to `name`."""
-        seconds, calls, stack, clock = self.seconds, self.calls, self._stack, time.thread_time
+        seconds, calls, stack, clock = self.seconds, self.calls, self._stack, time.perf_counter
 
         def timed(*arguments: Any, **options: Any) -> Any:
             now = clock()
@@ -57,7 +60,7 @@ class StopWatch:
         return timed
 
     def stop(self) -> None:
-        self.seconds[self._stack[-1]] += time.thread_time() - self._since
+        self.seconds[self._stack[-1]] += time.perf_counter() - self._since
 
     @staticmethod
     def own_cost(calls: int = 20000) -> float:
@@ -68,10 +71,10 @@ class StopWatch:
         for _ in range(calls):
             nothing(1, 2)
         watch.stop()
-        plain = time.thread_time()
+        plain = time.perf_counter()
         for _ in range(calls):
             pass
-        plain = time.thread_time() - plain
+        plain = time.perf_counter() - plain
         return max(0.0, (watch.seconds["x"] + watch.seconds[LOOP] - plain) / calls)
 
 
@@ -110,11 +113,11 @@ def parts_of(scenario: Scenario, vehicle: Vehicle) -> dict[str, dict[str, float]
     # parts without a __dict__ are charged at their class while the flight lasts
     builder = LogBuilder()
     with _everything(watch, scenario, vehicle):
-        land(scenario, vehicle, prepare=prepare, builder=builder)
+        flight = land(scenario, vehicle, prepare=prepare, builder=builder).flight
     watch.stop()
-    own = watch.own_cost()
+    own, awake = watch.own_cost(), flight.cpu / flight.wall
     return {
-        name: {"seconds": max(0.0, seconds - own * watch.calls[name]), "calls": float(watch.calls[name])}
+        name: {"seconds": awake * max(0.0, seconds - own * watch.calls[name]), "calls": float(watch.calls[name])}
         for name, seconds in watch.seconds.items()
     }
 
