@@ -153,6 +153,32 @@ def test_nothing_painted_is_taken_for_an_edge(width: float, scale: float) -> Non
             assert np.any(s.feature == Feature.THRESHOLD)
 
 
+def test_short_borders_seen_aslant_get_two_windows_each() -> None:
+    bench, rng = transport(WIDE, RunwayMap.unknown(45.0)), np.random.default_rng(8)
+    for k in range(20):
+        s = look(bench, approach_pose(-5000.0, rng, 300.0), rng, index=k)
+        assert s.lines.corners is not None
+        assert s.lines.vanishing is not None
+
+
+def test_marks_behind_a_far_border_do_not_pull_it() -> None:
+    """Aiming points 2.3 px inside cover a sixth of a mask's length: with arms of 3 px that is 0.2 px."""
+    bench, rng = transport(WIDE, RunwayMap.unknown(45.0), noise=0.0), np.random.default_rng(9)
+    looks = [look(bench, approach_pose(-4700.0 + 40.0 * k, rng), rng) for k in range(12)]
+    error, feature = np.concatenate([s.error for s in looks]), np.concatenate([s.feature for s in looks])
+    assert np.mean(error[feature <= Feature.RIGHT]) < 0.06
+    assert np.max(np.abs(error[feature <= Feature.RIGHT])) < 0.15
+
+
+def test_a_long_rollout_sees_borders_to_its_end() -> None:
+    """Beyond 50 widths there is runway as long as there is runway."""
+    bench, rng = transport(WIDE, RunwayMap.unknown(45.0)), np.random.default_rng(10)
+    for x in (2150.0, 2300.0, 2500.0):
+        s = look(bench, approach_pose(x, rng), rng)
+        assert np.max(np.abs(s.error)) < 0.5
+        assert [np.count_nonzero(s.feature == f) >= 3 for f in (Feature.LEFT, Feature.RIGHT)] == [True, True]
+
+
 def test_an_unknown_runway_is_placed_by_its_widths() -> None:
     """The same world twice as large, camera and all: not one window moves."""
     rng = np.random.default_rng(5)
