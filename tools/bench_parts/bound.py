@@ -22,21 +22,19 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from bench_parts.baseline import COMPARED, FROM, window
 from bench_parts.flights import land
-from landing_sim.estimators import kalman, states
-from landing_sim.estimators.aircraft_model import downwash, propagate, thrust
-from landing_sim.estimators.edge_model import edge_model
-from landing_sim.estimators.inertial_model import airspeed_model, gyro_model
+from landing_sim.estimators import states
 from landing_sim.estimators.rewind import Rewind
 from landing_sim.estimators.runway_ekf import RunwayEkf
 from landing_sim.missions.runway_landing import Parts
 from landing_sim.scenario import Scenario, load
-from landing_sim.signals import Command, Measurement, Status, Step
+from landing_sim.signals import Command, EdgeSet, Measurement, Status, Step
 from landing_sim.vehicle import Vehicle
 from landing_sim.vehicle import load as load_vehicle
 
@@ -45,96 +43,73 @@ MATCHED = ("believed.aero_sigma=0", "believed.mass_sigma=0")
 WORST_BIN = 100.0  # [m]
 
 
-def predicted(J: Array, F: Array, Q: Array) -> Array:
-    """Information after a transition, before its measurements: (F J^-1 F' + Q)^-1."""
-    return np.linalg.inv(F @ np.linalg.inv(J) @ F.T + Q)
-
-
 def measured(J: Array, H: Array, R: Array) -> Array:
     """Information with measurements of variances R (m,)."""
     return J + (H.T / R) @ H
 
 
 def true_state(step: Step, width: float) -> Array:
-    """(23,) layout of `states`; the sensors' errors are left at zero: only pan and tilt need them, see `_edges`."""
+    """Layout of `states`; errors of sensors and of the believed aircraft are left at zero, where Jacobians do not feel
+    them (pan and tilt are given as they truly were)."""
     truth, x = step.truth, np.zeros(states.N)
     x[:3] = truth.R_RB.T @ truth.v_RB_R
     x[3:6], x[6:9] = truth.w_RB_B, truth.euler
     x[9:12] = truth.p_RB * (1.0, 1.0, -1.0)
-    x[12:15], x[states.WIDTH] = truth.wind_R, width
+    x[list(states.WIND)], x[states.WIDTH] = truth.wind_R, width
     return x
 
 
 class Bound:
-    """The recursion along a flight, fed step by step with what the filter was fed with."""
+    """The recursion along a flight, fed step by step with what the filter was fed with.
+
+    Transition, process noise and inertial updates are the filter's own steps, taken from the true state; a Kalman
+    covariance at the true state is the inverse of the information.
+    """
 
     def __init__(self, ekf: RunwayEkf, width: float, trim: Command, delay: float) -> None:
+        if ekf.config.factorisation != "dense" or len(ekf.blocks.starts) > 2 or ekf.config.width == "separate":
+            raise ValueError("the bound is taken along a dense filter in one piece: the others approximate it")
         self._ekf, self._width, self._delay = ekf, width, delay
         self._acting, self._pending = trim, deque[tuple[float, Command]]()
-        self._t, self._x, self._shadow = 0.0, np.zeros(states.N), np.zeros(6)
-        self._frames = 0
-        self.P: Array | None = None
+        self._memory = ekf.init(0.0)
         self.edge_errors: list[float] = []  # in units of the believed ones
 
     def add(self, step: Step) -> Array | None:
         """(12,) standard deviations of the paper's states that no unbiased filter can beat; None before the start."""
-        t, x = step.truth.t, true_state(step, self._width)
+        ekf, t = self._ekf, step.truth.t
         while self._pending and self._pending[0][0] <= t + 1e-9:
-            self._predict(self._pending[0][0])
+            self._memory = ekf.predict(self._memory, self._acting, self._pending[0][0])
             self._acting = self._pending.popleft()[1]
-        self._predict(t)
-        self._x = x
+        self._memory = ekf.predict(self._memory, self._acting, t)
+        x = true_state(step, self._width)
         for m in step.measurements:
-            self._update(step, m)
+            if self._memory.valid:
+                self._memory = replace(self._memory, x=x)
+            if m.kind == "edges" and m.geometry is not None:
+                self._edges(step, m, m.geometry, x)
+            elif m.kind != "pose" or not self._memory.valid:
+                self._memory = ekf.update(self._memory, m)
         self._pending.append((t + self._delay, step.command))
-        return None if self.P is None else np.sqrt(np.diag(self.P)[:12])
+        if not self._memory.valid:
+            return None
+        self._memory = replace(self._memory, x=x)
+        return np.sqrt(np.diag(self._memory.P)[:12])
 
-    def _predict(self, t: float) -> None:
-        dt, ekf, c = t - self._t, self._ekf, self._acting
-        if dt <= 1e-12:
-            return
-        self._t = t
-        if self.P is None:
-            return
-        u, Phi15 = np.array([c.elevator, c.aileron, c.rudder, c.throttle, c.flap]), np.empty((15, 15))
-        propagate(self._x, self._shadow, u, ekf._par, False, dt, Phi15)
-        F = kalman.expand(Phi15, ekf.blocks.index, ekf._keep)
-        phase = "start" if self._frames < ekf.config.start_frames else "air"
-        self.P = F @ self.P @ F.T + ekf._process_noise(F, dt, phase)
-
-    def _update(self, step: Step, m: Measurement) -> None:
-        ekf = self._ekf
-        if m.kind == "pose" and self.P is None:
-            self.P = step.estimate.cov
-            c, x = self._acting, self._x
-            steady = thrust(c.throttle, step.truth.airspeed, ekf._par)
-            eps = downwash(x, math.atan2(x[2], x[0]), c.flap, ekf._par)
-            self._shadow = np.array([c.elevator, c.aileron, c.rudder, c.flap, steady, eps])
-        elif self.P is None:
-            return
-        elif m.kind == "gyro":
-            self._take(gyro_model(self._x, m.z)[1], m.R)
-        elif m.kind == "airspeed":
-            self._take(airspeed_model(self._x, m.z[0])[1], m.R)
-        elif m.kind == "edges" and m.geometry is not None:
-            self._frames += 1
-            g, found = m.geometry, m.geometry.status == Status.FOUND
-            h, Hx = np.empty(len(m.z)), np.empty((len(m.z), states.N))
-            edge_model(self._x, g.feature, g.centre, g.direction, step.camera.pan, step.camera.tilt, ekf._lever,
-                       ekf._focal, ekf._slope, h, Hx)  # fmt: skip
-            R = (m.R + ekf._extra_R)[found]
-            self.edge_errors += list((m.z - h)[found] / np.sqrt(R))
-            self._take(Hx[found], R)
-
-    def _take(self, Hx: Array, R: Array) -> None:
-        if self.P is not None and len(R):
-            self.P = np.linalg.inv(measured(np.linalg.inv(self.P), Hx[:, self._ekf.blocks.index], R))
+    def _edges(self, step: Step, m: Measurement, seen: EdgeSet, x: Array) -> None:
+        ekf, found = self._ekf, seen.status == Status.FOUND
+        h, Hx = np.empty(len(m.z)), np.empty((len(m.z), states.N))
+        ekf._predict_edges(x, replace(seen, pan=step.camera.pan, tilt=step.camera.tilt), h, Hx)
+        R = (m.R + ekf._extra_R)[found]
+        self.edge_errors += list((m.z - h)[found] / np.sqrt(R))
+        P = self._memory.P
+        if found.any():
+            P = np.linalg.inv(measured(np.linalg.inv(P), Hx[found][:, ekf.blocks.index], R))
+        self._memory = replace(self._memory, P=P, frames=self._memory.frames + 1)
 
 
 def one(scenario: Scenario, vehicle: Vehicle) -> tuple[Array, Array, Array, float]:
     """Of one flight: x (n,), errors (n, 3), bounds (n, 3) of range, height, lateral; RMS edge error in believed ones."""
     found: list[Parts] = []
-    rows: list[Array] = []
     steps: list[Step] = []
     flight = land(scenario, vehicle, prepare=found.append, watch=steps.append)
     parts = found[0]
