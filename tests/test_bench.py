@@ -17,6 +17,7 @@ sys.path.append(str(ROOT / "tools"))
 from bench_parts import bound, flights, where  # noqa: E402
 
 from landing_sim import scenario, vehicle  # noqa: E402
+from landing_sim.estimators import kalman  # noqa: E402
 
 PROMISED = {
     *("ratio_median", "ratio_min", "ratio_max", "recorded_ratio_median", "bare_step_us", "added_steps_per_frame"),
