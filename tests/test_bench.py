@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import subprocess
 import sys
 from pathlib import Path
@@ -63,19 +62,22 @@ def test_bare_flies_the_same_trajectory_to_the_bit() -> None:
 
 
 def test_stop_watch_charges_each_part_for_itself() -> None:
-    watch = where.StopWatch()
+    now = 0.0
+    watch = where.StopWatch(clock=lambda: now)
 
-    def burn(n: int) -> float:
-        return sum(math.sqrt(k) for k in range(n))
+    def take(seconds: float) -> None:
+        nonlocal now
+        now += seconds
 
-    inner = watch.on("inner", lambda: burn(40000))
-    outer = watch.on("outer", lambda: (burn(20000), inner()))
+    inner = watch.on("inner", lambda: take(0.25))
+    outer = watch.on("outer", lambda: (take(1.0), inner(), take(2.0)))
     watch.start()
     for _ in range(5):
         outer()
+        take(0.5)
     watch.stop()
     assert watch.calls == {"inner": 5, "outer": 5}
-    assert watch.seconds["inner"] > 1.3 * watch.seconds["outer"] > 0.0
+    assert watch.seconds == {"inner": 1.25, "outer": 15.0, where.LOOP: 2.5}
 
 
 def test_bound_is_tichavskys_recursion() -> None:

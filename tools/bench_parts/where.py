@@ -32,16 +32,17 @@ class StopWatch:
 
     seconds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     calls: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+    clock: Callable[[], float] = time.perf_counter
     _stack: list[str] = field(default_factory=lambda: [LOOP])
     _since: float = 0.0
 
     def start(self) -> None:
         self._stack[:] = [LOOP]
-        self._since = time.perf_counter()
+        self._since = self.clock()
 
     def on(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
         """`function`, charged to `name`."""
-        seconds, calls, stack, clock = self.seconds, self.calls, self._stack, time.perf_counter
+        seconds, calls, stack, clock = self.seconds, self.calls, self._stack, self.clock
 
         def timed(*arguments: Any, **options: Any) -> Any:
             now = clock()
@@ -60,7 +61,7 @@ class StopWatch:
         return timed
 
     def stop(self) -> None:
-        self.seconds[self._stack[-1]] += time.perf_counter() - self._since
+        self.seconds[self._stack[-1]] += self.clock() - self._since
 
     @staticmethod
     def own_cost(calls: int = 20000) -> float:
