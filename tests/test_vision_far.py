@@ -154,11 +154,15 @@ def test_nothing_painted_is_taken_for_an_edge(width: float, scale: float) -> Non
 
 
 def test_short_borders_seen_aslant_get_two_windows_each() -> None:
-    bench, rng = transport(WIDE, RunwayMap.unknown(45.0)), np.random.default_rng(8)
-    for k in range(20):
-        s = look(bench, approach_pose(-5000.0, rng, 300.0), rng, index=k)
-        assert s.lines.corners is not None
-        assert s.lines.vanishing is not None
+    """20 px of them, of which corners and horizon leave 9: two masks of 7 px fit, of 9 px only one."""
+    planner = WindowPlanner(RunwayMap.unknown(45.0), transport().camera)
+    for side in (-1.0, 1.0):
+        pose = np.array([-4900.0, side * 200.0, 215.0, -side * 7.0 * RAD, 3.0 * RAD, -side * 4.0 * RAD])
+        w = planner.place(sight(pose, 0.0, NOSE_TILT, 45.0), np.zeros((9, 9)), Scheme.parse("5L5R2T2H").counts)
+        ok = w.status == Status.FOUND
+        assert np.count_nonzero(ok & (w.feature == Feature.LEFT)) >= 2
+        assert np.count_nonzero(ok & (w.feature == Feature.RIGHT)) >= 2
+        assert np.min(w.half[ok & (w.feature <= Feature.RIGHT)]) < 4
 
 
 def test_marks_behind_a_far_border_do_not_pull_it() -> None:
