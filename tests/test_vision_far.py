@@ -154,11 +154,11 @@ def test_nothing_painted_is_taken_for_an_edge(width: float, scale: float) -> Non
 
 
 def test_short_borders_seen_aslant_get_two_windows_each() -> None:
-    """20 px of them, of which corners and horizon leave 9: two masks of 7 px fit, of 9 px only one."""
-    planner = WindowPlanner(RunwayMap.unknown(45.0), transport().camera)
+    """A runway 30 m wide from 4 km: two masks of 7 px fit between its corners, of 9 px only one."""
+    planner = WindowPlanner(RunwayMap.unknown(30.0), transport().camera)
     for side in (-1.0, 1.0):
-        pose = np.array([-4900.0, side * 200.0, 215.0, -side * 7.0 * RAD, 3.0 * RAD, -side * 4.0 * RAD])
-        w = planner.place(sight(pose, 0.0, NOSE_TILT, 45.0), np.zeros((9, 9)), Scheme.parse("5L5R2T2H").counts)
+        pose = np.array([-4000.0, side * 100.0, 160.0, -side * 7.0 * RAD, 3.0 * RAD, -side * 4.0 * RAD])
+        w = planner.place(sight(pose, 0.0, NOSE_TILT, 30.0), np.zeros((9, 9)), Scheme.parse("5L5R2T2H").counts)
         ok = w.status == Status.FOUND
         assert np.count_nonzero(ok & (w.feature == Feature.LEFT)) >= 2
         assert np.count_nonzero(ok & (w.feature == Feature.RIGHT)) >= 2
