@@ -90,7 +90,7 @@ def test_bound_is_tichavskys_recursion() -> None:
     D22 = np.linalg.inv(Q) + H.T @ np.diag(1.0 / R) @ H
     expected = D22 - D12.T @ np.linalg.solve(J + D11, D12)
     P = kalman.predict_dense(np.linalg.inv(J), F, Q, np.array([0, 4]))
-    np.testing.assert_allclose(bound.measured(np.linalg.inv(P), H, R), expected, rtol=1e-9)
+    np.testing.assert_allclose(np.linalg.inv(bound.measured(P, H, R)), expected, rtol=1e-9)
 
 
 def test_bound_lies_near_the_filters_own_sigma() -> None:

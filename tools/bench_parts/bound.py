@@ -5,9 +5,9 @@
 
 F and H are the filter's own transition and measurement Jacobians, taken at the TRUE state; Q is the filter's process
 noise, R what the front end and the data sheets say of a measurement; J_0 is the information of the acquired pose and the
-filter's priors. By the matrix inversion lemma the recursion is J_{k+1} = (F J_k^-1 F' + Q)^-1 + H' R^-1 H, which needs no
-inverse of Q: constant states (biases) have none. The expectations over trajectories are left out: it is the bound for
-flights along the one that was flown.
+filter's priors. By the matrix inversion lemma the recursion is J_{k+1} = (F J_k^-1 F' + Q)^-1 + H' R^-1 H, and it is
+carried on as J^-1, which needs no inverse of Q or of a prior: constant states (biases) and known ones have none. The
+expectations over trajectories are left out: it is the bound for flights along the one that was flown.
 
 The bound is that of the filter's model. Aircraft and wind of the simulation are not drawn from Q, so an RMS error can lie
 below it (Q allows for more than happened) as well as above (the model is wrong, or R too small): `edge_error` is the RMS
@@ -43,9 +43,10 @@ MATCHED = ("believed.aero_sigma=0", "believed.mass_sigma=0")
 WORST_BIN = 100.0  # [m]
 
 
-def measured(J: Array, H: Array, R: Array) -> Array:
-    """Information with measurements of variances R (m,)."""
-    return J + (H.T / R) @ H
+def measured(P: Array, H: Array, R: Array) -> Array:
+    """(P^-1 + H' R^-1 H)^-1 with variances R (m,), for a P that may hold states which are known."""
+    PH = P @ H.T
+    return P - PH @ np.linalg.solve(H @ PH + np.diag(R), PH.T)
 
 
 def true_state(step: Step, width: float) -> Array:
@@ -103,7 +104,7 @@ class Bound:
         self.edge_errors += list((m.z - h)[found] / np.sqrt(R))
         P = self._memory.P
         if found.any():
-            P = np.linalg.inv(measured(np.linalg.inv(P), Hx[found][:, ekf.blocks.index], R))
+            P = measured(P, Hx[found][:, ekf.blocks.index], R)
         self._memory = replace(self._memory, P=P, frames=self._memory.frames + 1)
 
 

@@ -27,6 +27,8 @@ def text(found: Mapping[str, Any]) -> str:
 
 def _aircraft(name: str, f: Mapping[str, Any]) -> Iterator[str]:
     yield f"{name}: {f['seconds']:.1f} s, {f['steps']} steps, {f['frames']} camera frames, {f['outcome']}"
+    if f["recorded_outcome"] != f["outcome"]:
+        yield f"  with 640x480 frames it does not end so but: {f['recorded_outcome']}"
     yield f"{f['repeats']} interleaved repeats, CPU time             median     min     max"
     for key, label in RATIOS:
         yield f"  {label:44s} {f[f'{key}_median']:7.2f} {f[f'{key}_min']:7.2f} {f[f'{key}_max']:7.2f}"
