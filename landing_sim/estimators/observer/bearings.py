@@ -20,7 +20,7 @@ from landing_sim.estimators.lines import RunwayLines, runway_lines, threshold_di
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.geometry.runway_image import horizon_dip
 from landing_sim.geometry.so3 import camera_from_body, from_euler, to_euler
-from landing_sim.geometry.vanishing import down_from_level_line, heading_from_point, heading_variance, roll_and_pitch
+from landing_sim.geometry.vanishing import down_from_level_line, heading_from_point, roll_and_pitch
 from landing_sim.signals import EdgeSet, Feature, Status
 from landing_sim.types import Array
 
@@ -32,9 +32,8 @@ SHORT = 20.0  # [px] between windows that then tell the threshold's direction wo
 class Bearings:
     """Of one image; None what it does not show."""
 
-    turned: (
-        tuple[float, float, float] | None
-    )  # [rad] runway's heading less the believed, its variance; vanishing point's rise
+    turned: tuple[Array, Array] | None  # (2,) [rad] runway's heading less the believed, vanishing point's rise; (2, 2)
+    pitched: float | None  # [rad] pitch less that of the horizon, whose dip is taken for that from `height`
     threshold: tuple[Array, Array] | None  # y1, y2, s and their variances (3,), (3,)
     borders: tuple[Array, Array] | None  # k of the left and right border and their variances (2,), (2,)
     rays: int  # windows that went into lines
@@ -60,13 +59,17 @@ def bearings(
     if attitude == "horizon" and lines.horizon is not None:
         phi, theta = roll_and_pitch(down_from_level_line(lines.horizon.homogeneous, lens), R_CB)
         R_RB = from_euler(phi, theta, to_euler(R_RB)[2])
+    pitched = None
+    if lines.horizon is not None:
+        theta = roll_and_pitch(down_from_level_line(lines.horizon.homogeneous, lens), R_CB)[1]
+        pitched = float(to_euler(R_RB)[1]) - theta
     R_RC = R_RB @ R_CB.T
     used = sum(line.used for line in (lines.left, lines.right, lines.threshold) if line is not None)
     point, turned = lines.vanishing, None
     if point is not None and _ahead(R_RC, point.uv[0], lens):
-        heading, rise = heading_from_point(point.uv[0], R_RC, lens)
-        turned = heading, heading_variance(point.uv[0], point.cov, R_RC, lens), rise
-    return Bearings(turned, _threshold(lines, R_RC, lens), _borders(lines, R_RC, lens), used)
+        J = _turn_by_pixel(R_RC, point.uv[0], lens)
+        turned = np.array(heading_from_point(point.uv[0], R_RC, lens)), J @ point.cov @ J.T
+    return Bearings(turned, pitched, _threshold(lines, R_RC, lens), _borders(lines, R_RC, lens), used)
 
 
 def _level_threshold(edges: EdgeSet, R_CR: Array, lens: Intrinsics) -> tuple[Array, float] | None:
@@ -79,6 +82,16 @@ def _level_threshold(edges: EdgeSet, R_CR: Array, lens: Intrinsics) -> tuple[Arr
 
 def _ray(R_RC: Array, uv: Array, lens: Intrinsics) -> Array:
     return np.asarray(R_RC @ np.array([(uv[0] - lens.cx) / lens.f, (uv[1] - lens.cy) / lens.f, 1.0]))
+
+
+def _turn_by_pixel(R_RC: Array, uv: Array, lens: Intrinsics) -> Array:
+    """(2, 2) derivative of heading and rise of a point at infinity by its pixel."""
+    w = _ray(R_RC, uv, lens)
+    ahead = math.hypot(w[0], w[1])
+    along = (w[0] * R_RC[0, :2] + w[1] * R_RC[1, :2]) / ahead
+    heading = (w[0] * R_RC[1, :2] - w[1] * R_RC[0, :2]) / ahead**2
+    rise = -(ahead * R_RC[2, :2] - w[2] * along) / (ahead**2 + w[2] ** 2)
+    return np.array([heading, rise]) / lens.f
 
 
 def _ahead(R_RC: Array, uv: Array, lens: Intrinsics) -> bool:

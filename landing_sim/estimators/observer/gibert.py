@@ -29,6 +29,7 @@ from landing_sim.estimators.observer.scene import Carriage, Scene
 from landing_sim.estimators.ranging.fused import correct, faded
 from landing_sim.estimators.ranging.gains import pole_pair
 from landing_sim.geometry.pinhole import Intrinsics
+from landing_sim.geometry.runway_image import horizon_dip
 from landing_sim.geometry.so3 import from_euler
 from landing_sim.types import Array
 
@@ -51,6 +52,7 @@ class GibertConfig:
     velocity_sigma: float = 0.3
     bearing_floor: float = 2e-4  # [rad] common to all windows of an image: attitude
     first_spread: float = 0.6
+    images: float = 25.0  # errors of edges last for as many: what one tells of directions counts for 1 / this
     course_drift: float = 0.01 * RAD  # [rad / sqrt(s)]
     tilt_drift: float = 0.003 * RAD
     least_range: float = 30.0  # [m] an estimate that runs through zero steers into the ground
@@ -96,7 +98,7 @@ class Gibert:
         if seen.turned is None and seen.borders is None and seen.threshold is None:
             return replace(scene, misses=scene.misses + 1, threshold_in_view=False)
         s, P = s.copy(), scene.P.copy()
-        turn = self._course(s, P, seen)
+        turn = self._course(s, P, seen, 0.5 * scene.spread * horizon_dip(float(ahead[2])))
         ahead[:2] = _turned(ahead[:2], turn)
         dt = min(max(image.t - scene.t_image, 1e-3), 0.5)
         d, spread = (0.0, 0.0, 0.0), scene.spread
@@ -122,19 +124,27 @@ class Gibert:
             frames=scene.frames + 1,
         )
 
-    def _course(self, s: Array, P: Array, seen: Bearings) -> float:
-        """The course and the tilt error follow the vanishing point; returns by how much the axes have turned [rad]."""
-        if seen.turned is None:
-            return 0.0
-        heading, variance, rise = seen.turned
-        variance += self.config.bearing_floor**2
-        turns = []
-        for i, error in ((sc.COURSE, heading), (sc.ETILT, rise)):
-            gain = P[i, i] / (P[i, i] + variance)
-            P[i, i] *= 1.0 - gain
-            s[i] += gain * error
-            turns.append(gain * error)
-        return turns[0]
+    def _course(self, s: Array, P: Array, seen: Bearings, dip: float) -> float:
+        """The course and the tilt error follow the vanishing point; returns by how much the axes have turned [rad].
+
+        The point lies best along the borders' own direction, which is neither heading nor rise: the two are estimated
+        together, with the horizon's say on the tilt, as far as the scale of its dip is known.
+        """
+        c, pair = self.config, np.ix_((sc.COURSE, sc.ETILT), (sc.COURSE, sc.ETILT))
+        C, off = P[pair], np.zeros(2)
+        if seen.pitched is not None:
+            gain = C[:, 1] / (C[1, 1] + c.images * (dip**2 + c.bearing_floor**2))
+            off = gain * seen.pitched
+            C = C - np.outer(gain, C[1])
+        if seen.turned is not None:
+            z, R = seen.turned
+            R = c.images * (R + c.bearing_floor**2 * np.eye(2))
+            gain2 = C @ np.linalg.inv(C + R)
+            off = off + gain2 @ (z - off)
+            C = C - gain2 @ C
+        P[pair] = 0.5 * (C + C.T)
+        s[[sc.COURSE, sc.ETILT]] += off
+        return float(off[0])
 
     def _range(
         self, ahead: Array, width: float, y: Array, var: Array, v_R: Array, spread: float, dt: float
