@@ -26,7 +26,7 @@ OUT = ROOT / "tests" / "acceptance"
 
 @dataclass(frozen=True, slots=True)
 class Promise:
-    """`statistic` ("p95", "p5", "min", "max", "mean", "median", "share") of a metric within [low, high]."""
+    """`statistic` ("p95", "p5", "min", "max", "mean", "median", "rms", "share") of a metric within [low, high]."""
 
     metric: str
     statistic: str
@@ -81,6 +81,32 @@ CONSISTENT = (
     Promise("nis", "mean", 0.7, 1.3),
 )
 
+UNKNOWN = (
+    LANDED,
+    Promise("range_1km_percent", "p95", high=2.0),
+    Promise("threshold_lateral_error_m", "p95", high=1.0),
+    Promise("threshold_height_error_m", "p95", high=1.0),
+    Promise("threshold_y_m", "p95", high=2.0),
+    Promise("threshold_above_m", "p95", high=2.5),
+    *box("touchdown_x_m", 250.0, 550.0),
+    Promise("touchdown_y_m", "p95", high=3.0),
+    Promise("sink_rate_mps", "p95", high=1.5),
+    Promise("touchdown_bank_deg", "p95", high=3.0),
+)
+INTERCEPT = (*UNKNOWN, Promise("range_settled_s", "p95", high=16.0))
+GLIDE = (
+    LANDED,
+    Promise("range_10s_percent", "rms", high=15.0),
+    Promise("range_20s_percent", "rms", high=4.0),
+    Promise("range_30s_percent", "rms", high=2.0),
+    Promise("range_60s_percent", "rms", high=0.5),
+)
+ON_GLIDE = ("initial.y_m=0", "initial.height_m=270.4", "initial.heading_deg=0", "observer.outputs=width")
+EFFECTS = {
+    "crosswind": ("wind.crosswind_mps=5.14",),
+    "misaligned": ("camera.platform.encoder_bias_deg=0.2",),
+    "velocity_bias": ("sensors.inertial.velocity_bias_mps=[0.5, 0.5, 0.5]",),
+}
 CAMPAIGNS: dict[str, Campaign] = {
     "gust": Campaign("do128/gust", GUST),
     "calm": Campaign("do128/calm", WEATHER),
@@ -97,6 +123,15 @@ CAMPAIGNS: dict[str, Campaign] = {
     "width_33": Campaign(
         "do128/calm", WIDTH, range(1, 21), ("filter.width=state", "filter.believed_width_m=33")
     ),
+    "unknown_far": Campaign("transport/gibert_far", INTERCEPT, range(1, 31)),
+    "unknown_near": Campaign("transport/gibert_near", INTERCEPT, range(1, 31)),
+    "unknown_ekf": Campaign("transport/ekf", INTERCEPT, range(1, 31)),
+    **{f"unknown_{name}": Campaign("transport/gibert_far", UNKNOWN, range(1, 31), changes)
+       for name, changes in EFFECTS.items()},
+    "glide_far": Campaign("transport/gibert_far", GLIDE, range(1, 16), ON_GLIDE),
+    "glide_near": Campaign("transport/gibert_near", GLIDE, range(1, 16), ON_GLIDE),
+    "transport_4d": Campaign("transport/turbulence", (LANDED,), range(1, 31)),
+    "do128_unknown": Campaign("do128/gibert", UNKNOWN[:6], range(1, 31)),
 }  # fmt: skip
 
 
@@ -119,7 +154,17 @@ def fly(job: tuple[str, tuple[str, ...], int]) -> dict[str, float]:
         error = log.error("W")
         metrics["width_at_loss_m"] = float(abs(error[seen][-1]))
         metrics["width_mean_m"] = float(abs(np.mean(error[far])))
-    return metrics
+    return metrics | ranging(log)
+
+
+def ranging(log: Any) -> dict[str, float]:
+    """When the range's error came below 5 % for good, up to 800 m before the threshold, and what it was until then."""
+    known, t, x = log["valid"], log["t_s"], log["true_x_m"]
+    off = 100.0 * np.abs(log.error("x")) / np.maximum(np.abs(log.truth("x")), 1.0)
+    since = t - t[np.argmax(known)]
+    wrong = np.flatnonzero(known & (off > 5.0) & (x < -800.0))
+    found = {f"range_{s}s_percent": float(np.interp(s, since[known], off[known])) for s in (10, 20, 30, 60)}
+    return found | {"range_settled_s": float(since[wrong[-1]]) if len(wrong) else 0.0}
 
 
 def statistic(values: np.ndarray, name: str) -> float:
@@ -135,6 +180,8 @@ def statistic(values: np.ndarray, name: str) -> float:
             return float(magnitude.max())
         case "median":
             return float(np.median(magnitude))
+        case "rms":
+            return float(np.sqrt(np.mean(values**2)))
         case "mean" | "share":
             return float(values.mean())
     raise ValueError(name)
