@@ -89,7 +89,9 @@ class Recorder:
         if image is None or step.truth.t < self._next_frame - 1e-9:
             return
         exposed, sample = image
-        self._next_frame = step.truth.t + self._period
+        # from when it was due, not from when an image came: the rate is kept on average
+        due = self._next_frame if self._next_frame > step.truth.t - self._period else step.truth.t
+        self._next_frame = due + self._period
         rr, stream = _rerun(), self._stream
         stream.set_time(TIMELINE, duration=step.truth.t)
         stream.log(IMAGE, rr.EncodedImage(contents=_jpeg(sample.frame.full()), media_type="image/jpeg"))
