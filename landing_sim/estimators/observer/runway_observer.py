@@ -44,7 +44,7 @@ class ObserverConfig:
     first_range: float | None = None
     trust: float = 0.1
     first_spread: float = 0.6  # relative, of the first guess
-    wind_filter: float = 1.0  # [s]
+    wind_filter: float = 0.2  # [s]
     pose_factor: float = 4.0  # an acquired pose is as much worse than its covariance says, far out
     camera_sigma: float = 0.3 * RAD  # of its mounting
     lost_after: int = 30  # images that showed nothing
