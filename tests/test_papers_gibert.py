@@ -8,24 +8,48 @@ import re
 
 import numpy as np
 import pytest
+import synthetic_flight as synthetic
 
 from landing_sim import papers
-from landing_sim.papers import claims, gibert_figures, point_approach, report
+from landing_sim.papers import claims, flying, gibert_figures, gibert_flown_figures, point_approach, report
 from landing_sim.papers import gibert_2015 as paper
 from landing_sim.papers import gibert_checks as check
+from landing_sim.papers import gibert_flown as fl
 from landing_sim.papers import gibert_trials as g
 from landing_sim.papers.academic_example import Trial, settings
 from landing_sim.papers.courses import Course, largest_step, rms_between, settling
+from landing_sim.papers.flights import Flown, Run
+from landing_sim.record.judge import outcome
+from landing_sim.record.log import FlightLog, LogBuilder
 
 JOBS = claims.runs_of(paper.CLAIMS)
 
 
+def flight(factor: float = 1.0, aside: float = 0.0, **kwargs: float) -> Flown:
+    """A flight made on paper whose estimate has `factor` times the true position; `aside` [m] moves the track."""
+    builder = LogBuilder()
+    for step in synthetic.fly(**kwargs):
+        builder.add(step)
+    log = builder.finish(
+        runway={"width_m": 29.0, "length_m": 1680.0}, touchdown=synthetic.touchdown(), seed=1, scenario={}
+    )
+    extra = {"true_y_m": log["true_y_m"] + aside}
+    for name, column in (("x", "x_m"), ("y", "y_m"), ("H", "H_m")):
+        true = extra.get("true_y_m", log["true_y_m"]) if name == "y" else log[f"true_{column}"]
+        extra[f"est_{column}"] = np.where(log["valid"], factor * true, np.nan)
+    for name in ("phi_rad", "theta_rad", "psi_rad"):
+        extra[f"est_{name}"] = np.where(log["valid"], log[f"true_{name}"], np.nan)
+    extra["flag_range_valid"] = log["valid"] & (log["t_s"] > 3.0)
+    return Flown(FlightLog({**log.columns, **extra}, log.meta))
+
+
 @pytest.fixture(scope="module")
-def results() -> dict[claims.Job, list[Course]]:
-    """One short trial and one watch stand for all."""
+def results() -> dict[claims.Job, list[Course] | Flown]:
+    """One short trial, one watch and one flight made on paper stand for all."""
     example = paper.perform(Trial("", g.SAMPLED.observer, 0.01))
     watched = paper.perform(point_approach.Watch("", g.SAFE, 1.5))
-    return {job: example if isinstance(job, Trial) else watched for job in JOBS}
+    flown = flight(1.02)
+    return {job: example if isinstance(job, Trial) else flown if isinstance(job, Run) else watched for job in JOBS}
 
 
 @pytest.fixture(scope="module")
@@ -139,15 +163,74 @@ def test_the_approach_is_one():
     assert np.abs(height).max() < 2.0  # on the glide path
 
 
+# ----------------------------------------------------------------------------------------------------------- flights
+
+
+def test_the_threshold_in_the_aircraft_s_axes():
+    """1000 m before it, 30 m right, 50 m high, level: 30 m to the left, 50 m down. Turned right by 90 deg: to the left."""
+    x, y, H, zero = (np.array([v]) for v in (-1000.0, 30.0, 50.0, 0.0))
+    assert fl._ahead(x, y, H, zero, zero, zero)[0] == pytest.approx([-30.0, 50.0, 1000.0])
+    assert fl._ahead(x, y, H, zero, zero, zero + math.pi / 2)[0] == pytest.approx([-1000.0, 50.0, -30.0])
+    assert fl._ahead(x, y, H, zero, zero + math.radians(5.0), zero)[0][1] > 50.0  # nose up: farther down
+
+
+def test_a_flight_s_course():
+    far = fl.course(flight(1.5).log)
+    assert far.t[0] == 0.0 and far.x[0, 2] == pytest.approx(944.0, abs=5.0)  # acquired after 0.12 s at 50 m/s
+    assert far.relative == pytest.approx(np.full(len(far.t), 0.5))
+    assert far.x[-1, 2] > 50.0  # ends where the threshold is lost
+
+
+def test_flights_by_hand(monkeypatch):
+    monkeypatch.setattr(fl, "LATE", 5.0)  # these are shorter
+    right, close, far = flight(), flight(1.04), flight(1.5)
+    assert fl.converges([right, close]).value == 0.0
+    assert "−50 %: 0.0 s, steered by from 2.9 s, touchdown 31 s" in fl.converges([right, close]).note
+    assert math.isnan(fl.converges([right, far]).value)
+    assert fl.late_error([close]).value == pytest.approx(4.0)
+    assert fl.tracks_apart([right, flight(aside=-7.0)]).value == pytest.approx(7.0)
+    assert fl.tracks_apart([right, right]).value == 0.0
+    assert fl.lands([right, far]).value == 2.0
+    assert fl.trusted(right.log) == pytest.approx(3.0 - fl.acquired(right.log), abs=0.07)
+
+
+def test_flights_that_never_see_the_runway_meet_nothing(results):
+    blind = flight(duration=3.0, acquired=99.0)
+    blind = Flown(FlightLog(blind.log.columns, {**blind.log.meta, "touchdown": None, "end": "crash"}))
+    failed = {job: blind if isinstance(job, Run) else result for job, result in results.items()}
+    rows = {row.claim.id: row for row in claims.evaluate(paper.CLAIMS, failed)}
+    for id in ("flown", "flown-zero", "flown-good", "flown-lands", "flown-point"):
+        assert rows[id].verdict == "not_met", id
+    assert math.isnan(rows["flown-track"].value) and "crash" in rows["flown-lands"].note
+    json.dumps(claims.to_json(paper.NAME, rows.values()), allow_nan=False)
+    assert all("<svg" in figure.svg for figure in gibert_flown_figures.flown(failed))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("run", "share"), tuple(zip(fl.BOTH, g.SHARES)))
+def test_it_lands_from_rendered_pixels(run, share):
+    log = flying.fly(run).log
+    course = fl.course(log)
+    assert course.x_hat[0, 2] == pytest.approx(share * course.x[0, 2], rel=0.02)
+    assert abs(log["true_x_m"][0] + 5000.0) < 1.0
+    assert outcome(log) == "landed"
+    assert settling(course) <= 30.0
+    assert np.abs(course.relative[course.t > 55.0]).max() < 0.01
+    # until the range may be trusted nobody turns in
+    waiting = (log["t_s"] > 1.0) & (log["t_s"] < fl.acquired(log) + fl.trusted(log))
+    assert waiting.any() and np.degrees(np.abs(log["true_phi_rad"][waiting])).max() < 2.0
+
+
 # ------------------------------------------------------------------------------------------------------------ report
 
 
 def test_report_holds_every_claim_and_figure(text):
     for row in paper.CLAIMS:
         assert f'<tr id="{row.id}">' in text
-    for number in (2, 3, 5, 6):
-        assert re.search(rf'id="figure-{number}">.*?<svg', text, re.DOTALL), number
-    assert "Simulations" in text and "1–20" in text
+    for place in ("2", "3", "5", "5-in-camera-axes", "5-as-errors", "5-without-pixels", "6"):
+        assert re.search(rf'id="figure-{place}">.*?<svg', text, re.DOTALL), place
+    assert "Simulations and flights" in text and "1–20" in text
+    assert "transport/gibert_near" in text and "transport/gibert_far" in text
 
 
 def test_report_needs_nothing_else(text):
@@ -167,5 +250,5 @@ def test_reproduce_writes_the_report(tmp_path):
     found = papers.reproduce("gibert-2015", tmp_path)
     assert json.loads((tmp_path / "claims.json").read_text()) == found.result
     verdicts = {row["id"]: row["verdict"] for row in found.result["claims"]}
-    unmet = {"speed", "approach-noise", "zero-noise", "eq3", "eq5-print", "eq17"}
+    unmet = {"speed", "approach-noise", "zero-noise", "eq3", "eq5-print", "eq17", "flown-point"}
     assert {id for id, verdict in verdicts.items() if verdict == "not_met"} == unmet

@@ -35,7 +35,7 @@ def load(name: str) -> Paper:
         from landing_sim.papers import gibert_2015 as gibert
         from landing_sim.papers import gibert_figures
 
-        text = (gibert.NAME, gibert.TITLE, gibert.LEAD, gibert.FIGURES, "Simulations", gibert.RUNS)
+        text = (gibert.NAME, gibert.TITLE, gibert.LEAD, gibert.FIGURES, "Simulations and flights", gibert.RUNS)
         return Paper(*text, gibert.CLAIMS, gibert.perform, gibert_figures.figures)
     raise KeyError(f"no such paper: {name!r}; there are: {', '.join(PAPERS)}")
 

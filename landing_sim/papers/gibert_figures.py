@@ -10,11 +10,11 @@ import numpy as np
 
 from landing_sim.papers import gibert_checks as check
 from landing_sim.papers import gibert_trials as g
-from landing_sim.papers.courses import Course, settling
+from landing_sim.papers.courses import settling
 from landing_sim.papers.drawing import CLAIM, OTHER, Figure, svg
 from landing_sim.papers.gibert_2015 import noise_rms
+from landing_sim.papers.gibert_flown_figures import BLACK, BLUE, RED, flown
 
-BLACK, BLUE, RED = "#1d2433", "#2a6fdb", "#d1495b"  # as in the paper's figure 5
 COLOURS = {
     "Gibert": "#d1495b",
     "Dahl": "#2a6f97",
@@ -25,7 +25,7 @@ COLOURS = {
     "Chen & Kano": "#9c6644",
     "Dixon": "#17a2a2",
 }
-Results = Mapping[Any, list[Course]]
+Results = Mapping[Any, Any]  # a list of Courses of a trial or a watch, what was Flown of a run
 
 
 def figures(results: Results) -> list[Figure]:
@@ -34,6 +34,7 @@ def figures(results: Results) -> list[Figure]:
         _without_noise(results),
         _with_noise(results),
         _speed_and_noise(results),
+        *flown(results),
         _landing(results),
         _observability(results),
         _heading(),
@@ -147,11 +148,11 @@ def _landing(results: Results) -> Figure:
         )
 
     caption = (
-        "The aim point in camera axes on an approach from 5 km, 300 m beside and 50 m above, half a pixel of noise. "
+        "A point mass guided by truth: the aim point from 5 km, 300 m beside and 50 m above, half a pixel of noise. "
         "Dotted: the paper's observer, which divides by d1 and breaks on the glide path. Full: both outputs weighed, dead "
         "reckoning where neither moves."
     )
-    return Figure("figure 5", "An airliner's approach", svg(draw, 3, 3.5), caption)
+    return Figure("figure 5 without pixels", "The approach computed, not flown", svg(draw, 3, 3.5), caption)
 
 
 def _observability(results: Results) -> Figure:
