@@ -37,6 +37,7 @@ class GuidanceMemory:
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of a go-around: time [s], height [m], climb rate [m/s]; of a
     # second flare: time, wheel height
     heading: float = 0.0  # [rad] held while the range is not known
+    aside: float = 0.0  # [m] where the lateral feedback is asked to, so that the aircraft comes to the centreline
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,6 +168,7 @@ class LandingGuidance:
             memory.blind,
             start,
             b.psi if mode == "hold" and memory.mode != mode else memory.heading,
+            self._aside(memory, mode, b.y, dt),
         )
         if mode == "rollout" or mode == "stopped":
             return memory, Reference(mode, 0.0, b.H, 0.0, 0.0, 0.0, 0.0)
@@ -196,7 +198,7 @@ class LandingGuidance:
         crab = -memory.crosswind / max(m.airspeed, 0.5 * path.touchdown)
         d = s.decrab
         aligned = d.fraction * min(max((d.start_height_m - height) / (d.start_height_m - d.end_height_m), 0.0), 1.0)
-        y, course, phi, r = 0.0, 0.0, 0.0, 0.0
+        y, course, phi, r = memory.aside, 0.0, 0.0, 0.0
         if memory.mode == "capture":
             # The law needs no offset error: course is a function of where the aircraft is.
             y, (course, gradient) = b.y, self.capture.course(b.y)
@@ -229,6 +231,12 @@ class LandingGuidance:
         }
         fall = -self.path.slope * math.hypot(m.x_dot, m.y_dot)
         return Reference("hold", self.path.approach, b.H, fall, b.y, memory.heading, 0.0, extra=extra)
+
+    def _aside(self, memory: GuidanceMemory, mode: str, y: float, dt: float) -> float:
+        """[m] next lateral trim; it stands while the aircraft is turned into the runway's direction."""
+        c = self.settings.capture
+        step = c.integral_per_s * y * dt if mode in ("glide", "flare") else 0.0
+        return min(max(memory.aside - step, -c.end_m), c.end_m)
 
     def _go_around(self, memory: GuidanceMemory, b: Believed, m: Motion) -> Reference:
         """Round out at a constant pull into a steady climb, wings level, heading kept along the runway."""

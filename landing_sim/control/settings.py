@@ -281,7 +281,8 @@ class PathSettings:
 class CaptureSettings:
     """Tangential capture of the centreline by a turn at constant bank; bank stays within the limit.
 
-    Within join_m the course is proportional to the offset; below end_m the lateral feedback takes over.
+    Within join_m the course is proportional to the offset; below end_m the lateral feedback takes over, trimmed at
+    integral_per_s times the offset, up to the width of end_m: what is believed of the crosswind may be a little wrong.
     """
 
     bank_deg: float
@@ -290,6 +291,7 @@ class CaptureSettings:
     join_m: float
     end_m: float
     heading_error_limit_deg: float
+    integral_per_s: float = 0.0
 
     __pydantic_config__ = _STRICT
 

@@ -45,9 +45,11 @@ class GibertConfig:
     outputs: Literal["both", "width", "point"] = "both"
     attitude: Literal["inertial", "horizon"] = "inertial"
     bandwidth: float = 0.5
+    later: float = 0.5  # share of the bandwidth that is left when the first guess has been forgotten
+    hurry: float = 10.0  # [s] in which it falls to that
     bearing_rate: float = 2.0
     eps: float = 0.1
-    floor: float = 4.0  # [m/s] of bearings: what moves slower than this is drowned in the velocity's error over d
+    floor: float = 10.0  # [m/s] of bearings: what moves slower than this is drowned in the velocity's error over d
     limit: float = 0.02  # largest share of the range that one image may correct
     velocity_sigma: float = 0.3
     bearing_floor: float = 2e-4  # [rad] common to all windows of an image: attitude
@@ -74,7 +76,7 @@ class Gibert:
         P = np.diag(np.diag(P))
         P[sc.COURSE, sc.COURSE] -= P[sc.EPAN, sc.EPAN]
         P[sc.EPAN, sc.EPAN] = 0.0
-        return Scene(s, P, self.config.first_spread, t)
+        return Scene(s, P, self.config.first_spread, t, t)
 
     def move(self, scene: Scene, way_R: Array, dt: float) -> Scene:
         s = sc.moved(scene.s, way_R, dt)
@@ -106,7 +108,7 @@ class Gibert:
         if seen.threshold is not None and ahead[0] > 0.0:
             y, var = seen.threshold
             ahead, s[sc.WIDTH], d, spread = self._range(
-                ahead, s[sc.WIDTH], _bearings_turned(y, turn), var, carried.v_R, spread, dt
+                ahead, s[sc.WIDTH], _bearings_turned(y, turn), var, carried.v_R, spread, dt, image.t - scene.t_start
             )
         elif seen.borders is not None:
             ahead = self._borders(ahead, s[sc.WIDTH], *seen.borders, dt)
@@ -147,10 +149,11 @@ class Gibert:
         return float(off[0])
 
     def _range(
-        self, ahead: Array, width: float, y: Array, var: Array, v_R: Array, spread: float, dt: float
+        self, ahead: Array, width: float, y: Array, var: Array, v_R: Array, spread: float, dt: float, since: float = 0.0
     ) -> tuple[Array, float, tuple[float, float, float], float]:
         """Way to the threshold (3,), width, d and spread after one correction."""
         c = self.config
+        omega = c.bandwidth * (c.later + (1.0 - c.later) * math.exp(-since / c.hurry))
         rho = 1.0 / max(float(ahead[0]), c.least_range)
         was = np.array([ahead[1] * rho, ahead[2] * rho, width * rho])
         d = np.array([v_R[0] * was[0] - v_R[1], v_R[0] * was[1] - v_R[2], v_R[0] * was[2]])
@@ -158,13 +161,13 @@ class Gibert:
         weights = faded(self._use * float(np.min(var)) / var, d, self._floors)
         e = y - was
         # poles: the range's twice for the width, the range's and the bearings' for these
-        l1, l2 = pole_pair(1.0, c.bandwidth, dt)
-        fast, slow = 1.0 - math.exp(-c.bearing_rate * dt), 1.0 - math.exp(-c.bandwidth * dt)
+        l1, l2 = pole_pair(1.0, omega, dt)
+        fast, slow = 1.0 - math.exp(-c.bearing_rate * dt), 1.0 - math.exp(-omega * dt)
         share = np.array([fast / slow, fast / slow, 1.0])
         got = correct(was, rho, e * share, d, weights, (l1, l2), c.eps, c.limit)
         below = got.observed**2 + c.eps**2
         noise = l2 * math.sqrt(float(np.sum((weights * d * share) ** 2 * var))) / (below * rho)
-        spread = math.hypot(spread * (1.0 - got.observed**2 / below * 0.5 * c.bandwidth * dt), noise)
+        spread = math.hypot(spread * (1.0 - got.observed**2 / below * 0.5 * omega * dt), noise)
         X = max(1.0 / got.rho, c.least_range)
         bearing = was[:2] + fast * e[:2]
         return np.array([X, *(bearing * X)]), float(got.z[2] * X), (float(d[0]), float(d[1]), float(d[2])), spread

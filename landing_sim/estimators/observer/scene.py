@@ -36,6 +36,7 @@ class Scene:
     P: Array  # (N, N)
     spread: float  # 1 sigma of the range, relative: what is trusted to be the scale's error
     t_image: float  # [s] of the last image used
+    t_start: float = 0.0  # [s] of the acquisition
     d: tuple[float, float, float] = (0.0, 0.0, 0.0)  # d1, d2 of the threshold, and that of its width [m/s]
     misses: int = 0  # images in a row that showed nothing
     threshold_in_view: bool = False
