@@ -29,8 +29,8 @@ N = 13
 @dataclass(frozen=True, slots=True)
 class Scene:
     """What is believed of the runway and of the way to it. s (N,): x, y, H of the camera [m], the runway's true course
-    [rad], its width [m], the camera's pan, tilt and roll error [rad], by how much borders and threshold are measured too far
-    inside [px], and the inertial velocity's bias [m/s] in R."""
+    [rad], its width [m], the camera's pan, tilt and roll error [rad], by how much borders and threshold are measured too
+    far inside [px], and the inertial velocity's bias [m/s] in R."""
 
     s: Array
     P: Array  # (N, N)
