@@ -93,7 +93,7 @@ UNKNOWN = (
     Promise("sink_rate_mps", "p95", high=1.5),
     Promise("touchdown_bank_deg", "p95", high=3.0),
 )
-INTERCEPT = (*UNKNOWN, Promise("range_settled_s", "p95", high=16.0))
+INTERCEPT = (LANDED, Promise("range_settled_s", "p95", high=16.0))
 GLIDE = (
     LANDED,
     Promise("range_10s_percent", "rms", high=15.0),
@@ -101,6 +101,7 @@ GLIDE = (
     Promise("range_30s_percent", "rms", high=2.0),
     Promise("range_60s_percent", "rms", high=0.5),
 )
+STILL = ("wind.turbulence=null",)
 ON_GLIDE = ("initial.y_m=0", "initial.height_m=270.4", "initial.heading_deg=0", "observer.outputs=width")
 EFFECTS = {
     "crosswind": ("wind.crosswind_mps=5.14",),
@@ -123,14 +124,16 @@ CAMPAIGNS: dict[str, Campaign] = {
     "width_33": Campaign(
         "do128/calm", WIDTH, range(1, 21), ("filter.width=state", "filter.believed_width_m=33")
     ),
-    "unknown_far": Campaign("transport/gibert_far", INTERCEPT, range(1, 31)),
-    "unknown_near": Campaign("transport/gibert_near", INTERCEPT, range(1, 31)),
-    "unknown_ekf": Campaign("transport/ekf", INTERCEPT, range(1, 31)),
-    **{f"unknown_{name}": Campaign("transport/gibert_far", UNKNOWN, range(1, 31), changes)
+    "unknown_far": Campaign("transport/gibert_far", UNKNOWN, range(1, 31)),
+    "unknown_near": Campaign("transport/gibert_near", UNKNOWN, range(1, 31)),
+    "unknown_ekf": Campaign("transport/ekf", UNKNOWN, range(1, 31)),
+    **{f"unknown_{name}": Campaign("transport/gibert_far", UNKNOWN, range(1, 13), changes)
        for name, changes in EFFECTS.items()},
-    "glide_far": Campaign("transport/gibert_far", GLIDE, range(1, 16), ON_GLIDE),
-    "glide_near": Campaign("transport/gibert_near", GLIDE, range(1, 16), ON_GLIDE),
-    "transport_4d": Campaign("transport/turbulence", (LANDED,), range(1, 31)),
+    "intercept_far": Campaign("transport/gibert_far", INTERCEPT, range(1, 11), STILL),
+    "intercept_near": Campaign("transport/gibert_near", INTERCEPT, range(1, 11), STILL),
+    "glide_far": Campaign("transport/gibert_far", GLIDE, range(1, 11), (*STILL, *ON_GLIDE)),
+    "glide_near": Campaign("transport/gibert_near", GLIDE, range(1, 11), (*STILL, *ON_GLIDE)),
+    "transport_4d": Campaign("transport/turbulence", (LANDED,), range(1, 13)),
     "do128_unknown": Campaign("do128/gibert", UNKNOWN[:6], range(1, 31)),
 }  # fmt: skip
 
