@@ -17,6 +17,7 @@ def test_the_unknown_runway_is_landed_on(name: str) -> None:
     assert not failed, failed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["transport/gibert_far", "transport/gibert_near"])
 def test_a_range_that_is_not_valid_steers_nothing(name: str) -> None:
     """Wings level and straight on until the range is within its trust; the flag says so; then it turns."""
@@ -33,6 +34,7 @@ def test_a_range_that_is_not_valid_steers_nothing(name: str) -> None:
     assert turned > 5.0
 
 
+@pytest.mark.slow
 def test_the_true_size_is_not_used() -> None:
     """A runway two thirds as wide is found to be that wide, from the same first guess of the range."""
     for width in (45.0, 30.0):
@@ -41,6 +43,7 @@ def test_the_true_size_is_not_used() -> None:
         assert np.abs(log["est_W_m"][airborne] - width).max() < 0.02 * width
 
 
+@pytest.mark.slow
 def test_uncompensated_latency_costs_what_compensation_saves() -> None:
     """160 ms old images taken for new ones: the range from the bearings is off while the aircraft turns."""
 
@@ -52,6 +55,7 @@ def test_uncompensated_latency_costs_what_compensation_saves() -> None:
     assert off() < 0.5 * off("filter.compensate_latency=false")
 
 
+@pytest.mark.slow
 def test_the_aim_points_bearing_alone_does_not_land() -> None:
     """On the glide d1 = d2 = 0: the range is never valid, nothing is steered by it, the approach is given up."""
     flight = fly("transport/gibert_far", CALM, "observer.outputs=point", "initial.y_m=0", "initial.height_m=270.4",
@@ -61,6 +65,7 @@ def test_the_aim_points_bearing_alone_does_not_land() -> None:
     assert np.abs(flight.log["est_d1"][flight.log["valid"]]).max() < 3.0
 
 
+@pytest.mark.slow
 def test_roll_and_pitch_may_come_from_the_horizon() -> None:
     flight = fly("transport/gibert_far", CALM, "observer.attitude=horizon")
     assert flight.verdict.outcome == "landed"

@@ -54,9 +54,10 @@ def test_shipped_scenarios_load_and_name_their_schema(name: str) -> None:
     assert again == s
 
 
-def test_the_shipped_six() -> None:
-    names = ("calm", "gust", "gust_light", "gust_moderate", "headwind", "tailwind")
+def test_what_is_shipped() -> None:
+    names = ("calm", "gibert", "gust", "gust_light", "gust_moderate", "headwind", "tailwind")
     assert set(names) == {n.removeprefix("do128/") for n in paths.scenario_names() if n.startswith("do128/")}
+    assert {"transport/gibert_far", "transport/gibert_near", "transport/ekf"} <= set(paths.scenario_names())
     gust = scenario.load("do128/gust").wind
     assert (gust.crosswind_mps, gust.crosswind_from_x_m) == (-1.0, -800.0)
     assert gust.gust is not None
