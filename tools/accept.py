@@ -131,6 +131,8 @@ CAMPAIGNS: dict[str, Campaign] = {
        for name, changes in EFFECTS.items()},
     "intercept_far": Campaign("transport/gibert_far", INTERCEPT, range(1, 11), STILL),
     "intercept_near": Campaign("transport/gibert_near", INTERCEPT, range(1, 11), STILL),
+    "intercept_ekf_far": Campaign("transport/ekf", INTERCEPT, range(1, 11), STILL),
+    "intercept_ekf_near": Campaign("transport/ekf", INTERCEPT, range(1, 11), (*STILL, "observer.first_range_m=2500")),
     "glide_far": Campaign("transport/gibert_far", GLIDE, range(1, 11), (*STILL, *ON_GLIDE)),
     "glide_near": Campaign("transport/gibert_near", GLIDE, range(1, 11), (*STILL, *ON_GLIDE)),
     "transport_4d": Campaign("transport/turbulence", (LANDED,), range(1, 13)),
