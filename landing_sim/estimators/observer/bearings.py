@@ -36,7 +36,6 @@ class Bearings:
     pitched: float | None  # [rad] pitch less that of the horizon, whose dip is taken for that from `height`
     threshold: tuple[Array, Array] | None  # y1, y2, s and their variances (3,), (3,)
     borders: tuple[Array, Array] | None  # k of the left and right border and their variances (2,), (2,)
-    rays: int  # windows that went into lines
 
 
 def bearings(
@@ -64,12 +63,11 @@ def bearings(
         theta = roll_and_pitch(down_from_level_line(lines.horizon.homogeneous, lens), R_CB)[1]
         pitched = float(to_euler(R_RB)[1]) - theta
     R_RC = R_RB @ R_CB.T
-    used = sum(line.used for line in (lines.left, lines.right, lines.threshold) if line is not None)
     point, turned = lines.vanishing, None
     if point is not None and _ahead(R_RC, point.uv[0], lens):
         J = _turn_by_pixel(R_RC, point.uv[0], lens)
         turned = np.array(heading_from_point(point.uv[0], R_RC, lens)), J @ point.cov @ J.T
-    return Bearings(turned, pitched, _threshold(lines, R_RC, lens), _borders(lines, R_RC, lens), used)
+    return Bearings(turned, pitched, _threshold(lines, R_RC, lens), _borders(lines, R_RC, lens))
 
 
 def _level_threshold(edges: EdgeSet, R_CR: Array, lens: Intrinsics) -> tuple[Array, float] | None:
