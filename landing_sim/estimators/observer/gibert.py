@@ -39,8 +39,8 @@ RAD = math.pi / 180.0
 @dataclass(frozen=True, slots=True)
 class GibertConfig:
     """bandwidth [rad/s] of the range at first, a double pole; bearing_rate [1/s] of the bearings; eps [m/s] of angular
-    motion below which the range is carried; velocity_sigma [m/s] believed of the inertial unit; first_spread: relative, of the first
-    guess. The error is believed to fall at half the bandwidth, since a double pole's begins slowly."""
+    motion below which the range is carried; velocity_sigma [m/s] believed of the inertial unit; first_spread: relative, of
+    the first guess. The error is believed to fall at half the bandwidth, since a double pole's begins slowly."""
 
     outputs: Literal["both", "width", "point"] = "both"
     attitude: Literal["inertial", "horizon"] = "inertial"
