@@ -35,14 +35,14 @@ class Plant(Protocol):
     @property
     def touchdown(self) -> Touchdown | None: ...
 
-    def fast_truth(self) -> tuple[float, float, float]:
-        """x, H [m] of the cg in R and true airspeed [m/s]: all that the wind needs each dt."""
+    def fast_truth(self) -> tuple[float, float, float, float]:
+        """x, y, H [m] of the cg in R and true airspeed [m/s]: all that the wind needs each dt."""
 
 
 class World(Protocol):
     """The moving air. Called once every plant step."""
 
-    def wind(self, t: float, x: float, height: float, airspeed: float) -> Array:
+    def wind(self, t: float, x: float, y: float, height: float, airspeed: float) -> Array:
         """(3,) [m/s] velocity of the air in R at the aircraft; `height` above the runway's threshold plane."""
 
 

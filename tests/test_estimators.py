@@ -312,7 +312,7 @@ def test_offset_sigma_is_that_of_perturbed_aircraft() -> None:
 def test_reported_turbulence_changes_the_wind_as_drydens_does(height: float) -> None:
     """The noise that the filter is given is the variance of what the simulated gusts change by in a cycle."""
     air = DrydenTurbulence(Turbulence(10.0), Noise(3, "air"))
-    gusts = np.array([air.velocity(0.06 * k, 0.0, height, 47.0) for k in range(20000)])
+    gusts = np.array([air.velocity(0.06 * k, 0.0, 0.0, height, 47.0) for k in range(20000)])
     found, told = np.diff(gusts, axis=0).var(axis=0), gusts_change(height, 10.0, 47.0, 0.06)
     assert found[0] == pytest.approx(told[0], rel=0.05)
     np.testing.assert_allclose(found[1:], told[1:], rtol=0.6)  # the transverse spectra are not first-order

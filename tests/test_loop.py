@@ -40,12 +40,12 @@ class Plant:
     def camera(self) -> CameraTruth:
         return CameraTruth(np.zeros(3), np.eye(3), 0.0, 0.0)
 
-    def fast_truth(self) -> tuple[float, float, float]:
-        return 0.0, 0.0, 50.0
+    def fast_truth(self) -> tuple[float, float, float, float]:
+        return 0.0, 0.0, 0.0, 50.0
 
 
 class Air:
-    def wind(self, t: float, x: float, height: float, airspeed: float) -> np.ndarray:
+    def wind(self, t: float, x: float, y: float, height: float, airspeed: float) -> np.ndarray:
         return np.zeros(3)
 
 

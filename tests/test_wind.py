@@ -20,41 +20,43 @@ PAPER = WindConfig(step=CrosswindStep(), gust=ExponentialGust())
 def test_steady_signs() -> None:
     """A headwind is air moving towards -x; a positive crosswind moves towards +y."""
     wind = Wind(WindConfig(SteadyWind(headwind=5.0, crosswind=-2.0)))
-    np.testing.assert_array_equal(wind.wind(0.0, -950.0, 51.0, 50.0), [-5.0, -2.0, 0.0])
+    np.testing.assert_array_equal(wind.wind(0.0, -950.0, 0.0, 51.0, 50.0), [-5.0, -2.0, 0.0])
 
 
 def test_step_and_gust_of_the_paper() -> None:
     """-1 m/s beyond -800 m; at -650 m -2 m/s lateral and 1 m/s upward (z is down) are added, gone to 1/e in 6 s."""
     wind = Wind(PAPER)
-    np.testing.assert_array_equal(wind.wind(0.0, -950.0, 51.0, 50.0), [0.0, 0.0, 0.0])
-    np.testing.assert_array_equal(wind.wind(3.0, -800.0, 45.0, 50.0), [0.0, 0.0, 0.0])
-    np.testing.assert_array_equal(wind.wind(3.005, -799.75, 45.0, 50.0), [0.0, -1.0, 0.0])
-    np.testing.assert_array_equal(wind.wind(6.0, -650.0, 38.0, 50.0), [0.0, -1.0, 0.0])
-    np.testing.assert_array_equal(wind.wind(6.005, -649.75, 38.0, 50.0), [0.0, -3.0, -1.0])
-    np.testing.assert_allclose(wind.wind(12.005, -350.0, 20.0, 50.0), [0.0, -1.7357588823, -0.3678794412], rtol=1e-9)
+    np.testing.assert_array_equal(wind.wind(0.0, -950.0, 0.0, 51.0, 50.0), [0.0, 0.0, 0.0])
+    np.testing.assert_array_equal(wind.wind(3.0, -800.0, 0.0, 45.0, 50.0), [0.0, 0.0, 0.0])
+    np.testing.assert_array_equal(wind.wind(3.005, -799.75, 0.0, 45.0, 50.0), [0.0, -1.0, 0.0])
+    np.testing.assert_array_equal(wind.wind(6.0, -650.0, 0.0, 38.0, 50.0), [0.0, -1.0, 0.0])
+    np.testing.assert_array_equal(wind.wind(6.005, -649.75, 0.0, 38.0, 50.0), [0.0, -3.0, -1.0])
+    np.testing.assert_allclose(
+        wind.wind(12.005, -350.0, 0.0, 20.0, 50.0), [0.0, -1.7357588823, -0.3678794412], rtol=1e-9
+    )
 
 
 def test_gust_goes_on_wherever_the_aircraft_goes_then() -> None:
     wind = Wind(WindConfig(gust=ExponentialGust(at_x=-650.0, lateral=-2.0, vertical=0.0, tau=6.0)))
-    wind.wind(6.0, -649.0, 38.0, 50.0)
-    np.testing.assert_allclose(wind.wind(12.0, -900.0, 38.0, 50.0), [0.0, -2.0 * math.exp(-1.0), 0.0])
+    wind.wind(6.0, -649.0, 0.0, 38.0, 50.0)
+    np.testing.assert_allclose(wind.wind(12.0, -900.0, 0.0, 38.0, 50.0), [0.0, -2.0 * math.exp(-1.0), 0.0])
 
 
 def test_a_gust_once_met_does_not_start_again() -> None:
     """A Wind flown a second time would otherwise blow harder than ever."""
     wind = Wind(PAPER)
-    wind.wind(6.0, -649.0, 38.0, 50.0)
+    wind.wind(6.0, -649.0, 0.0, 38.0, 50.0)
     with pytest.raises(ValueError, match="time went back"):
-        wind.wind(0.0, -950.0, 51.0, 50.0)
+        wind.wind(0.0, -950.0, 0.0, 51.0, 50.0)
 
 
 def test_gust_meets_at_once_who_starts_beyond_it() -> None:
-    np.testing.assert_array_equal(Wind(PAPER).wind(0.0, -500.0, 30.0, 50.0), [0.0, -3.0, -1.0])
+    np.testing.assert_array_equal(Wind(PAPER).wind(0.0, -500.0, 0.0, 30.0, 50.0), [0.0, -3.0, -1.0])
 
 
 def test_softened_step() -> None:
     step = CrosswindStep(at_x=-800.0, crosswind=4.0, over=40.0)
-    at = [step.velocity(0.0, x, 45.0, 50.0)[1] for x in (-800.0, -790.0, -780.0, -770.0, -760.0, 0.0)]
+    at = [step.velocity(0.0, x, 0.0, 45.0, 50.0)[1] for x in (-800.0, -790.0, -780.0, -770.0, -760.0, 0.0)]
     np.testing.assert_allclose(at, [0.0, 0.5857864376, 2.0, 3.4142135624, 4.0, 4.0], rtol=1e-9)
 
 
@@ -69,7 +71,7 @@ def test_parts_add_and_each_answer_is_its_own() -> None:
     whole, split = Wind(config, Noise(3, "turbulence")), [Wind(part, Noise(3, "turbulence")) for part in parts]
     kept = []
     for k in range(2000):
-        here = (0.005 * k, -900.0 + 0.25 * k, 50.0 - 0.01 * k, 50.0)
+        here = (0.005 * k, -900.0 + 0.25 * k, 0.0, 50.0 - 0.01 * k, 50.0)
         kept.append(whole.wind(*here))
         np.testing.assert_allclose(kept[-1], sum(part.wind(*here) for part in split), rtol=0, atol=1e-12)
     assert len({row.tobytes() for row in kept}) == 2000
@@ -120,7 +122,7 @@ def test_named_intensities() -> None:
 
 def _fly(config: Turbulence, n: int, dt: float, height: float = 50.0, seed: int = 1) -> np.ndarray:
     gust = DrydenTurbulence(config, Noise(seed, "turbulence"))
-    return np.array([gust.velocity(k * dt, 0.0, height, 50.0) for k in range(n)])
+    return np.array([gust.velocity(k * dt, 0.0, 0.0, height, 50.0) for k in range(n)])
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -209,18 +211,18 @@ def test_time() -> None:
     """The same time gives the same gust and uses no noise; time does not run backwards."""
     once, twice = (DrydenTurbulence(Turbulence(5.0), Noise(1, "turbulence")) for _ in range(2))
     for k in range(50):
-        a = once.velocity(0.005 * k, 0.0, 50.0, 50.0)
-        assert twice.velocity(0.005 * k, 0.0, 50.0, 50.0) == a
-        assert twice.velocity(0.005 * k, 0.0, 50.0, 50.0) == a
+        a = once.velocity(0.005 * k, 0.0, 0.0, 50.0, 50.0)
+        assert twice.velocity(0.005 * k, 0.0, 0.0, 50.0, 50.0) == a
+        assert twice.velocity(0.005 * k, 0.0, 0.0, 50.0, 50.0) == a
     with pytest.raises(ValueError, match="time went back"):
-        once.velocity(0.2, 0.0, 50.0, 50.0)
+        once.velocity(0.2, 0.0, 0.0, 50.0, 50.0)
 
 
 def test_standing_still_freezes_the_gust() -> None:
     """Taylor's frozen field: without airspeed nothing changes."""
     gust = DrydenTurbulence(Turbulence(5.0), Noise(1, "turbulence"))
-    first = gust.velocity(0.0, 0.0, 50.0, 0.0)
-    assert gust.velocity(10.0, 0.0, 50.0, 0.0) == pytest.approx(first, rel=1e-12)
+    first = gust.velocity(0.0, 0.0, 0.0, 50.0, 0.0)
+    assert gust.velocity(10.0, 0.0, 0.0, 50.0, 0.0) == pytest.approx(first, rel=1e-12)
     assert max(abs(c) for c in first) > 0.0
 
 
@@ -232,5 +234,5 @@ def test_standing_still_freezes_the_gust() -> None:
 def test_gusts_stay_within_reason(height: float, airspeed: float, dt: float, w20: float, seed: int) -> None:
     gust = DrydenTurbulence(Turbulence(w20), Noise(seed, "turbulence"))
     for k in range(20):
-        for c in gust.velocity(k * dt, 0.0, height, airspeed):
+        for c in gust.velocity(k * dt, 0.0, 0.0, height, airspeed):
             assert abs(c) <= 7 * 0.2 * w20  # 0.2 w20 > sigma at any height

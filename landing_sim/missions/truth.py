@@ -105,7 +105,7 @@ def plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt | Strapdown, w
         initial,
         math.atan(r.slope_percent / 100.0),
         scenario.time.step_s,
-        wind.wind(0.0, s.x_m, s.height_m, airspeed),
+        wind.wind(0.0, s.x_m, s.y_m, s.height_m, airspeed),
         platform,
         np.array(vehicle.camera.p_BC_m),
     )

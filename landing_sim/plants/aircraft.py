@@ -237,7 +237,7 @@ class JsbsimPlant:
         )  # fmt: skip
         model.set_terrain_ft(elevation / FT)
         self._R_RN_rows = body.R_RN.tolist()
-        self._x, _, down = body.p_R.tolist()
+        self._x, self._y, down = body.p_R.tolist()
         self._H = -down
         if not abs(self._x) + abs(down) < FAR_AWAY:
             raise PlantError(f"the aircraft has left the runway's neighbourhood: x {self._x:g} m, H {self._H:g} m")
@@ -309,8 +309,8 @@ class JsbsimPlant:
     def touchdown(self) -> Touchdown | None:
         return self._touchdown
 
-    def fast_truth(self) -> tuple[float, float, float]:
-        return self._x, self._H, self._model.airspeed_fps() * FT
+    def fast_truth(self) -> tuple[float, float, float, float]:
+        return self._x, self._y, self._H, self._model.airspeed_fps() * FT
 
     def truth(self) -> Truth:
         """Raises PlantError if JSBSim does not fly in the wind it was given."""

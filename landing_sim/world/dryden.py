@@ -113,7 +113,7 @@ class DrydenTurbulence:
         self._t = math.nan
         self._gust = (0.0, 0.0, 0.0)
 
-    def velocity(self, t: float, x: float, height: float, airspeed: float) -> tuple[float, float, float]:
+    def velocity(self, t: float, x: float, y: float, height: float, airspeed: float) -> tuple[float, float, float]:
         """u, v, w [m/s] along R's x, y, z at time t; the same time again gives the same gust.
 
         Raises ValueError when time runs backwards.

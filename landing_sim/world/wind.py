@@ -24,8 +24,8 @@ from landing_sim.world.dryden import DrydenTurbulence, Turbulence
 class WindPart(Protocol):
     """One contribution to the wind."""
 
-    def velocity(self, t: float, x: float, height: float, airspeed: float) -> tuple[float, float, float]:
-        """Velocity of the air in R [m/s]; t [s], x and height [m] of the cg in R, true airspeed [m/s]."""
+    def velocity(self, t: float, x: float, y: float, height: float, airspeed: float) -> tuple[float, float, float]:
+        """Velocity of the air in R [m/s]; t [s], x, y and height [m] of the cg in R, true airspeed."""
 
 
 def _check_finite(part: str, values: Sequence[float]) -> None:
@@ -43,7 +43,7 @@ class SteadyWind:
     def __post_init__(self) -> None:
         _check_finite("steady wind", astuple(self))
 
-    def velocity(self, t: float, x: float, height: float, airspeed: float) -> tuple[float, float, float]:
+    def velocity(self, t: float, x: float, y: float, height: float, airspeed: float) -> tuple[float, float, float]:
         return -self.headwind, self.crosswind, 0.0
 
 
@@ -63,7 +63,7 @@ class CrosswindStep:
         if self.over < 0.0:
             raise ValueError(f"crosswind step: 'over' is the distance of the rise in m and cannot be {self.over}")
 
-    def velocity(self, t: float, x: float, height: float, airspeed: float) -> tuple[float, float, float]:
+    def velocity(self, t: float, x: float, y: float, height: float, airspeed: float) -> tuple[float, float, float]:
         inside = x - self.at_x
         if inside <= 0.0:
             return 0.0, 0.0, 0.0
@@ -101,7 +101,7 @@ class _MetGust:
         self._gust = gust
         self._t_met = math.nan
 
-    def velocity(self, t: float, x: float, height: float, airspeed: float) -> tuple[float, float, float]:
+    def velocity(self, t: float, x: float, y: float, height: float, airspeed: float) -> tuple[float, float, float]:
         gust = self._gust
         if math.isnan(self._t_met):
             if x <= gust.at_x:
@@ -148,11 +148,11 @@ class Wind:
             parts.append(DrydenTurbulence(config.turbulence, noise))
         self._velocities = tuple(part.velocity for part in parts)
 
-    def wind(self, t: float, x: float, height: float, airspeed: float) -> Array:
+    def wind(self, t: float, x: float, y: float, height: float, airspeed: float) -> Array:
         """(3,) [m/s] velocity of the air in R at the aircraft, a new array each call."""
         wx = wy = wz = 0.0
         for velocity in self._velocities:
-            a, b, c = velocity(t, x, height, airspeed)
+            a, b, c = velocity(t, x, y, height, airspeed)
             wx += a
             wy += b
             wz += c
