@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 RESULT, LOG, RECORDING, SCENARIO = "result.json", "log.parquet", "recording.rrd", "scenario.json"
 _OURS = (RESULT, LOG, RECORDING, SCENARIO)
+MISSIONS = {"runway_landing": runway_landing.build}
+"""What builds the flight, by the scenario's `mission`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +61,7 @@ def fly(
     """
     started = time.perf_counter()
     try:
-        mission = runway_landing.build(scenario, vehicle, scenario.seed)
+        mission = MISSIONS[scenario.mission](scenario, vehicle, scenario.seed)
     except (PlantError, ValueError) as error:
         raise ScenarioError([Problem(Mark(scenario.name), (), f"cannot be flown: {error}")]) from error
     listeners = [] if watch is None else [watch]

@@ -1,0 +1,1 @@
+"""The sections of a scenario file: frozen, checked values with their units in the keys."""
