@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 from landing_sim.noise import NoiseStream
@@ -15,7 +16,6 @@ from landing_sim.signals import (
     Touchdown,
     Truth,
 )
-from landing_sim.types import Array
 
 
 class Plant(Protocol):
@@ -25,8 +25,8 @@ class Plant(Protocol):
 
     def reset(self) -> Truth: ...
 
-    def step(self, command: Command, wind_R: Array) -> None:
-        """Advance one dt."""
+    def step(self, command: Command, wind_R: Sequence[float]) -> None:
+        """Advance one dt in air moving at wind_R: x, y, z in R [m/s]."""
 
     def truth(self) -> Truth: ...
 
@@ -42,8 +42,8 @@ class Plant(Protocol):
 class World(Protocol):
     """The moving air. Called once every plant step."""
 
-    def wind(self, t: float, x: float, y: float, height: float, airspeed: float) -> Array:
-        """(3,) [m/s] velocity of the air in R at the aircraft; `height` above the runway's threshold plane."""
+    def wind(self, t: float, x: float, y: float, height: float, airspeed: float) -> tuple[float, float, float]:
+        """Velocity of the air in R at the aircraft [m/s]; `height` above the runway's threshold plane."""
 
 
 class Sensor(Protocol):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
@@ -110,7 +111,7 @@ class JsbsimPlant:
         initial: InitialState,
         slope: float = 0.0,
         dt: float = 0.005,
-        wind_R: Array | None = None,
+        wind_R: Sequence[float] | None = None,
         platform: Platform | None = None,
         p_BC: Array | None = None,
     ) -> None:
@@ -199,11 +200,11 @@ class JsbsimPlant:
 
     # ------------------------------------------------------------------------------------------ stepping
 
-    def step(self, command: Command, wind_R: Array) -> None:
-        """Advance one dt under `command` in air moving at wind_R (3,) [m/s]. Raises PlantError."""
+    def step(self, command: Command, wind_R: Sequence[float]) -> None:
+        """Advance one dt under `command` in air moving at wind_R: x, y, z in R [m/s]. Raises PlantError."""
         model = self._model
         self._write(command)
-        a, b, c = wind_R.tolist()
+        a, b, c = wind_R
         R = self._R_RN_rows
         self._wind_N = [R[0][i] * a + R[1][i] * b + R[2][i] * c for i in range(3)]
         for write, value in zip(model.set_wind_fps, self._wind_N):

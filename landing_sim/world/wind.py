@@ -14,10 +14,7 @@ from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from typing import Protocol
 
-import numpy as np
-
 from landing_sim.noise import NoiseStream
-from landing_sim.types import Array
 from landing_sim.world.dryden import DrydenTurbulence, Turbulence
 
 
@@ -148,16 +145,12 @@ class Wind:
             parts.append(DrydenTurbulence(config.turbulence, noise))
         self._velocities = tuple(part.velocity for part in parts)
 
-    def wind(self, t: float, x: float, y: float, height: float, airspeed: float) -> Array:
-        """(3,) [m/s] velocity of the air in R at the aircraft, a new array each call."""
+    def wind(self, t: float, x: float, y: float, height: float, airspeed: float) -> tuple[float, float, float]:
+        """Velocity of the air in R at the aircraft [m/s]."""
         wx = wy = wz = 0.0
         for velocity in self._velocities:
             a, b, c = velocity(t, x, y, height, airspeed)
             wx += a
             wy += b
             wz += c
-        wind_R = np.empty(3)
-        wind_R[0] = wx
-        wind_R[1] = wy
-        wind_R[2] = wz
-        return wind_R
+        return wx, wy, wz
