@@ -19,13 +19,14 @@ from pydantic import Field, model_validator
 from landing_sim import config, paths, yamlfile
 from landing_sim.config import Section, inconsistent
 from landing_sim.errors import ConfigError, Location, Problem, ScenarioError, did_you_mean
+from landing_sim.sections import wind
 from landing_sim.sections.judged import LANDING, Criterion, Record
 from landing_sim.sections.onboard import Believed, Control, Filter, Observer, Vision
 from landing_sim.sections.sensors import Camera, Sensors
-from landing_sim.sections.wind import Turbulence, Wind
+from landing_sim.sections.wind import Wind
 from landing_sim.sections.world import Aircraft, Initial, Runway, Time
 
-__all__ = ["MODELS", "Scenario", "Time", "Turbulence", "dump", "load", "schema", "schema_text"]
+__all__ = ["MODELS", "Scenario", "Time", "dump", "load", "schema", "schema_text"]
 
 
 class Scenario(Section):
@@ -67,9 +68,7 @@ class Scenario(Section):
         for where, period, unit, name in periods:
             if not _whole(period, unit):
                 problems.append((where, f"{period:g} is not a whole multiple of {name} = {unit:g}"))
-        turbulence = self.wind.turbulence
-        if turbulence and (turbulence.severity is None) == (turbulence.wind_at_20ft_mps is None):
-            problems.append((("wind", "turbulence"), "give one of severity and wind_at_20ft_mps"))
+        problems += wind.problems(self.wind)
         length = self.runway.length_m
         for i, taxiway in enumerate(self.runway.taxiways):
             half = 0.5 * taxiway.width_m + taxiway.flare_m

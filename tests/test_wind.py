@@ -189,6 +189,7 @@ def _step_matrices(r: float) -> tuple[np.ndarray, np.ndarray]:
     return F, G @ G.T
 
 
+@settings(deadline=None)  # the first call compiles
 @given(r=st.floats(1e-5, 20.0))
 def test_discretisation_is_exact(r: float) -> None:
     """Two steps of r are one of 2 r, in mean and in covariance; the stationary covariance stays what it is."""
@@ -226,7 +227,7 @@ def test_standing_still_freezes_the_gust() -> None:
     assert max(abs(c) for c in first) > 0.0
 
 
-@settings(max_examples=50)
+@settings(max_examples=50, deadline=None)
 @given(
     height=st.floats(-5, 3000), airspeed=st.floats(0, 300), dt=st.floats(1e-4, 10), w20=st.floats(0, 30),
     seed=st.integers(0, 5),

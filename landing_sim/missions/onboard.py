@@ -153,8 +153,8 @@ def _late(scenario: Scenario, estimator: Estimator) -> Estimator:
 
 def _reported_turbulence(scenario: Scenario) -> float:
     """[m/s] wind at 20 ft: the report is right unless the scenario says otherwise."""
-    reported, actual = scenario.believed.turbulence_mps, scenario.wind.turbulence
-    return reported if reported is not None else 0.0 if actual is None else truth.wind_20ft(actual)
+    reported = scenario.believed.turbulence_mps
+    return truth.wind_20ft(scenario.wind) if reported is None else reported
 
 
 def _airspeed_sigma(scenario: Scenario) -> float:

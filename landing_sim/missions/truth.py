@@ -14,7 +14,7 @@ from landing_sim.interfaces import Sensor
 from landing_sim.noise import Noise
 from landing_sim.plants.aircraft import InitialState, JsbsimPlant
 from landing_sim.scenario import Scenario
-from landing_sim.scenario import Turbulence as WantedTurbulence
+from landing_sim.sections.wind import Wind as WantedWind
 from landing_sim.sensors.airdata import Airspeed, AirspeedConfig, FlowAngles, FlowAnglesConfig
 from landing_sim.sensors.camera import Camera, Encoders
 from landing_sim.sensors.inertial import Gyro, GyroConfig
@@ -23,8 +23,12 @@ from landing_sim.sensors.platform import PanTilt, Strapdown
 from landing_sim.sensors.render import Optics
 from landing_sim.sensors.squat import SquatSwitch
 from landing_sim.vehicle import Vehicle
-from landing_sim.world.dryden import W20, Turbulence
+from landing_sim.world.dryden import FOOT, W20, Turbulence, low_altitude
+from landing_sim.world.first_order import FirstOrder
+from landing_sim.world.gusts import DiscreteGust
+from landing_sim.world.microburst import Microburst
 from landing_sim.world.runway import Greys, Runway, Taxiway
+from landing_sim.world.shear import AT_33FT, CATEGORY_C_ROUGHNESS, CertificationWind, LogWind
 from landing_sim.world.wind import CrosswindStep, ExponentialGust, SteadyWind, Wind, WindConfig
 
 
@@ -41,27 +45,64 @@ def runway(scenario: Scenario) -> Runway:
     )
 
 
-def wind_20ft(turbulence: WantedTurbulence) -> float:
-    """[m/s] that its severity stands for."""
-    return (turbulence.wind_at_20ft_mps or 0.0) if turbulence.severity is None else W20[turbulence.severity]
+def turbulence(wanted: WantedWind) -> Turbulence | FirstOrder | None:
+    """The continuous turbulence. Where it goes with the wind at 33 ft, that of the steady wind unless it is named."""
+    t = wanted.turbulence
+    if t is None:
+        return None
+    if t.model == "first_order":
+        return FirstOrder(0.15 * (_wind_33ft(wanted) if t.wind_at_33ft_mps is None else t.wind_at_33ft_mps))
+    return Turbulence((t.wind_at_20ft_mps or 0.0) if t.severity is None else W20[t.severity])
+
+
+def wind_20ft(wanted: WantedWind) -> float:
+    """[m/s] the wind at 20 ft whose Dryden turbulence is, at 100 ft, as strong as what blows, in the stronger axis."""
+    air = turbulence(wanted)
+    if air is None:
+        return 0.0
+    if isinstance(air, Turbulence):
+        return air.w20
+    sigma_uv, sigma_w, _, _ = low_altitude(100.0 * FOOT, 1.0)
+    return max(air.sigma_level / sigma_uv, air.sigma_vertical / sigma_w)
+
+
+def _wind_33ft(wanted: WantedWind) -> float:
+    if wanted.profile is None:  # a crosswind that blows only on a part of the way counts, too
+        return math.hypot(wanted.headwind_mps, wanted.crosswind_mps)
+    return math.hypot(*_steady(wanted).velocity(0.0, 0.0, 0.0, AT_33FT, 0.0))
+
+
+def _steady(w: WantedWind) -> SteadyWind | LogWind | CertificationWind:
+    if w.profile is None:
+        return SteadyWind(w.headwind_mps, w.crosswind_mps if w.crosswind_from_x_m is None else 0.0)
+    if w.profile.law == "certification":
+        return CertificationWind(w.headwind_mps, w.crosswind_mps)
+    return LogWind(
+        w.headwind_mps,
+        w.crosswind_mps,
+        w.profile.reference_height_m or AT_33FT,
+        w.profile.roughness_m or CATEGORY_C_ROUGHNESS,
+    )
 
 
 def wind(scenario: Scenario, noise: Noise) -> Wind:
     """All that moves the air."""
     w = scenario.wind
-    everywhere = w.crosswind_from_x_m is None
-    turbulence = None
-    if w.turbulence is not None:
-        turbulence = Turbulence(wind_20ft(w.turbulence))
     config = WindConfig(
-        steady=SteadyWind(w.headwind_mps, w.crosswind_mps if everywhere else 0.0),
+        steady=_steady(w),
         step=None if w.crosswind_from_x_m is None else CrosswindStep(w.crosswind_from_x_m, w.crosswind_mps),
         gust=None
         if w.gust is None
         else ExponentialGust(w.gust.at_x_m, w.gust.lateral_mps, w.gust.vertical_mps, w.gust.time_constant_s),
-        turbulence=turbulence,
+        turbulence=turbulence(w),
+        discrete=None
+        if (g := w.discrete_gust) is None
+        else DiscreteGust(g.at_x_m, g.headwind_mps, g.lateral_mps, g.vertical_mps, g.gradient_m, g.shape),
+        microburst=None
+        if (b := w.microburst) is None
+        else Microburst(b.x_m, b.y_m, b.radius_m, b.outflow_mps, b.outflow_height_m),
     )
-    return Wind(config, noise)
+    return Wind(config, noise, scenario.runway.slope_percent / 100.0)
 
 
 def platform(scenario: Scenario, vehicle: Vehicle, noise: Noise) -> PanTilt | Strapdown:

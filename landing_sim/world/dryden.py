@@ -7,6 +7,8 @@ Axes       u, v, w along R's x, y, z. The standard's axes follow the mean wind; 
            direction and a headwind agree within the crab angle, and sigma_u = sigma_v, L_u = L_v.
 Omitted    the rotary components p, q, r (gradients over span and tail): the plant takes one wind at the cg.
 Source     MIL-F-8785C (1980), section 3.7.2 (Dryden form) and 3.7.3.4 (low-altitude model, below 1,000 ft).
+           MIL-HDBK-1797 (1997) halves the lengths L_v, L_w and writes twice the length into the transverse spectra: for
+           the three components here, below 1,000 ft, that is the same air (`spectrum_1797`; checked in the tests).
 """
 
 from __future__ import annotations
@@ -57,6 +59,32 @@ def low_altitude(height: float, w20: float) -> tuple[float, float, float, float]
     base = 0.177 + 0.000823 * h
     sigma_w = 0.1 * w20
     return sigma_w / base**0.4, sigma_w, FOOT * h / base**1.2, FOOT * h
+
+
+def spectrum_8785c(omega: Array, height: float, w20: float, airspeed: float) -> tuple[Array, Array, Array]:
+    """One-sided spectra [m^2/s^2 per rad/s] of u, v, w at omega (n,) [rad/s], as MIL-F-8785C has them."""
+    sigma_uv, sigma_w, L_uv, L_w = low_altitude(height, w20)
+
+    def transverse(sigma: float, L: float) -> Array:
+        a = (L * omega / airspeed) ** 2
+        return sigma**2 * L / (math.pi * airspeed) * (1.0 + 3.0 * a) / (1.0 + a) ** 2
+
+    return _along(omega, sigma_uv, L_uv, airspeed), transverse(sigma_uv, L_uv), transverse(sigma_w, L_w)
+
+
+def spectrum_1797(omega: Array, height: float, w20: float, airspeed: float) -> tuple[Array, Array, Array]:
+    """The same as MIL-HDBK-1797 has them: L_v = L_u / 2, L_w = h / 2."""
+    sigma_uv, sigma_w, L_u, h = low_altitude(height, w20)
+
+    def transverse(sigma: float, L: float) -> Array:
+        a = (L * omega / airspeed) ** 2
+        return 2.0 * sigma**2 * L / (math.pi * airspeed) * (1.0 + 12.0 * a) / (1.0 + 4.0 * a) ** 2
+
+    return _along(omega, sigma_uv, L_u, airspeed), transverse(sigma_uv, 0.5 * L_u), transverse(sigma_w, 0.5 * h)
+
+
+def _along(omega: Array, sigma: float, L: float, airspeed: float) -> Array:
+    return 2.0 * sigma**2 * L / (math.pi * airspeed) / (1.0 + (L * omega / airspeed) ** 2)
 
 
 @kernel

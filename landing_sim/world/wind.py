@@ -3,8 +3,8 @@
 Signs      parts answer in R: x along the landing direction, y right, z DOWN. In the settings `headwind` is positive on
            the nose (-x); `crosswind` and `lateral` are positive blowing towards +y (to the right, from the left);
            `vertical` is positive blowing UP (-z), as height is.
-A further kind of wind (shear, 1-cosine gust, microburst) is one more part: a frozen dataclass with `velocity` if it
-depends on place and time only, a small class made from one if it remembers.
+A further kind of wind is one more part: a frozen dataclass with `velocity` if it depends on place and time only, a small
+class made from one if it remembers.
 """
 
 from __future__ import annotations
@@ -16,6 +16,10 @@ from typing import Protocol
 
 from landing_sim.noise import NoiseStream
 from landing_sim.world.dryden import DrydenTurbulence, Turbulence
+from landing_sim.world.first_order import FirstOrder, FirstOrderTurbulence
+from landing_sim.world.gusts import DiscreteGust, MetDiscreteGust
+from landing_sim.world.microburst import Microburst
+from landing_sim.world.shear import CertificationWind, LogWind
 
 
 class WindPart(Protocol):
@@ -114,10 +118,12 @@ class _MetGust:
 class WindConfig:
     """What blows; a part that is None does not."""
 
-    steady: SteadyWind = SteadyWind()
+    steady: SteadyWind | LogWind | CertificationWind = SteadyWind()
     step: CrosswindStep | None = None
     gust: ExponentialGust | None = None
-    turbulence: Turbulence | None = None
+    turbulence: Turbulence | FirstOrder | None = None
+    discrete: DiscreteGust | None = None
+    microburst: Microburst | None = None
 
 
 class Wind:
@@ -127,26 +133,38 @@ class Wind:
     ----------
     config : what blows
     noise : stream of the turbulence; needed with turbulence only
+    slope : tangent of the runway's slope: parts are told the height above its surface, level before the threshold
 
-    Raises ValueError for turbulence without a noise stream.
+    Raises ValueError for turbulence without a noise stream, for a slope that is not finite.
     """
 
-    __slots__ = ("_velocities",)
+    __slots__ = ("_slope", "_velocities")
 
-    def __init__(self, config: WindConfig, noise: NoiseStream | None = None) -> None:
+    def __init__(self, config: WindConfig, noise: NoiseStream | None = None, slope: float = 0.0) -> None:
+        _check_finite("wind", (slope,))
+        self._slope = slope
         parts: list[WindPart] = [config.steady]
         if config.step is not None:
             parts.append(config.step)
         if config.gust is not None:
             parts.append(_MetGust(config.gust))
+        if config.discrete is not None:
+            parts.append(MetDiscreteGust(config.discrete))
+        if config.microburst is not None:
+            parts.append(config.microburst)
         if config.turbulence is not None:
             if noise is None:
                 raise ValueError("wind: turbulence needs a noise stream, e.g. Noise(seed, 'turbulence', run)")
-            parts.append(DrydenTurbulence(config.turbulence, noise))
+            if isinstance(config.turbulence, Turbulence):
+                parts.append(DrydenTurbulence(config.turbulence, noise))
+            else:
+                parts.append(FirstOrderTurbulence(config.turbulence, noise))
         self._velocities = tuple(part.velocity for part in parts)
 
     def wind(self, t: float, x: float, y: float, height: float, airspeed: float) -> tuple[float, float, float]:
         """Velocity of the air in R at the aircraft [m/s]."""
+        if x > 0.0:
+            height -= self._slope * x
         wx = wy = wz = 0.0
         for velocity in self._velocities:
             a, b, c = velocity(t, x, y, height, airspeed)
