@@ -358,9 +358,7 @@ def test_watchdog_reopens_a_locked_out_filter() -> None:
     wrong = memory.x.copy()
     wrong[states.X] += 60.0
     wrong[states.Y] += 6.0
-    from dataclasses import replace
-
-    memory = replace(memory, x=wrong)
+    memory = memory._replace(x=wrong)
     par, x = ekf._par, truth[-1].copy()
     s = bench.settle(x, par)
     reinflated = False

@@ -63,7 +63,7 @@ def predict_dense(P: Array, Phi: Array, Qd: Array, starts: Array) -> Array:
     """P- = Phi P+ Phi' + Qd within each block (eq. 9)."""
     n = P.shape[0]
     out = np.zeros((n, n))
-    T = np.zeros((n, n))
+    TT = np.zeros((n, n))  # (Phi P+)'; most of Phi is zero and left out, which changes no bit
     for b in range(starts.shape[0] - 1):
         lo, hi = starts[b], starts[b + 1]
         for i in range(lo, hi):
@@ -71,16 +71,17 @@ def predict_dense(P: Array, Phi: Array, Qd: Array, starts: Array) -> Array:
                 a = Phi[i, k]
                 if a != 0.0:
                     for j in range(lo, hi):
-                        T[i, j] += a * P[k, j]
-        for i in range(lo, hi):
-            for j in range(i, hi):
-                acc = Qd[i, j]
-                for k in range(lo, hi):
-                    a = Phi[j, k]
-                    if a != 0.0:
-                        acc += T[i, k] * a
-                out[i, j] = acc
-                out[j, i] = acc
+                        TT[j, i] += a * P[k, j]
+        for j in range(lo, hi):
+            for i in range(lo, j + 1):
+                out[j, i] = Qd[i, j]
+            for k in range(lo, hi):
+                a = Phi[j, k]
+                if a != 0.0:
+                    for i in range(lo, j + 1):
+                        out[j, i] += TT[k, i] * a
+            for i in range(lo, j):
+                out[i, j] = out[j, i]
     return out
 
 
@@ -221,13 +222,17 @@ def integrated_noise(Phi: Array, q: Array, dt: float, starts: Array) -> Array:
     n = q.shape[0]
     out = np.zeros((n, n))
     for b in range(starts.shape[0] - 1):
-        for i in range(starts[b], starts[b + 1]):
-            for j in range(i, starts[b + 1]):
-                acc = q[i] if i == j else 0.0
-                for k in range(starts[b], starts[b + 1]):
-                    acc += Phi[i, k] * q[k] * Phi[j, k]
-                out[i, j] = 0.5 * dt * acc
-                out[j, i] = out[i, j]
+        lo, hi = starts[b], starts[b + 1]
+        for j in range(lo, hi):
+            out[j, j] = q[j]
+            for k in range(lo, hi):
+                a = Phi[j, k]
+                if a != 0.0:
+                    for i in range(lo, j + 1):
+                        out[j, i] += Phi[i, k] * q[k] * a
+            for i in range(lo, j + 1):
+                out[j, i] *= 0.5 * dt
+                out[i, j] = out[j, i]
     return out
 
 

@@ -11,21 +11,22 @@ Source     Dickmanns & Schell 1992, sections 2-4 and 7.1; Bierman 1977. Departs:
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
 from landing_sim.estimators import kalman, states
-from landing_sim.estimators.aircraft_model import downwash, parameters, propagate, thrust
+from landing_sim.estimators.aircraft_model import downwash, parameters, thrust
 from landing_sim.estimators.belief import AircraftBelief
-from landing_sim.estimators.edge_model import edge_model
 from landing_sim.estimators.gusts import change
 from landing_sim.estimators.inertial_model import airspeed_model, gyro_model
 from landing_sim.estimators.runway_filter import RAD, Blocks, FilterConfig, Memory
+from landing_sim.estimators.runway_steps import correct_dense, correct_ud, of_index, transition, weigh
 from landing_sim.estimators.width import WidthFilter, rescaled
 from landing_sim.geometry.pinhole import Intrinsics
-from landing_sim.signals import Command, EdgeSet, Estimate, Feature, Measurement, Residuals, Status
+from landing_sim.signals import Command, Estimate, Measurement, Residuals
 from landing_sim.types import Array
+
+_ALL: np.ndarray = np.ones(3, dtype=np.bool_)  # readings of a sensor are not gated
 
 
 class RunwayEkf:
@@ -75,7 +76,7 @@ class RunwayEkf:
         if config.turbulence > 0.0:
             self._wind = np.equal.outer(self.blocks.index, states.WIND).astype(float)
         self._prior = self._prior_variance()
-        self._constant_Q: dict[tuple[str, int], Array] = {}
+        self._gate = math.inf if config.gate_sigma is None else config.gate_sigma**2
 
     # ------------------------------------------------------------------------------------------- interface
 
@@ -93,14 +94,12 @@ class RunwayEkf:
         u = np.array([command.elevator, command.aileron, command.rudder, command.throttle, command.flap])
         if not memory.valid:
             steady = thrust(command.throttle, memory.airspeed, self._par)
-            return replace(memory, t=t, shadow=np.array([*u[:3], command.flap, steady, 0.0]))
-        x, shadow = memory.x.copy(), memory.shadow.copy()
-        driving = np.empty((states.DRIVING, states.DRIVING))
-        propagate(x, shadow, u, self._par, memory.on_ground, dt, driving)
-        x[states.JPAN] = x[states.JTILT] = 0.0  # the next reading's noise is another
-        Phi = kalman.expand(driving, self.blocks.index, self._keep)
+            return memory._replace(t=t, shadow=np.array([*u[:3], command.flap, steady, 0.0]))
         phase = "ground" if memory.on_ground else "start" if memory.frames < self.config.start_frames else "air"
-        Qd = self._process_noise(Phi, dt, phase)
+        x, shadow, Phi, Qd = transition(
+            memory.x, memory.shadow, u, self._par, memory.on_ground, dt, self.blocks.index, self.blocks.starts,
+            self._keep, self._q[phase], self._noise_variance, self.config.process_noise == "integrated",
+        )  # fmt: skip
         if self._wind is not None and not memory.on_ground:
             changes = change(x[states.H] - self._slope * x[states.X], self.config.turbulence, memory.airspeed, dt)
             Qd = Qd + np.diag(self._wind @ changes)
@@ -109,7 +108,7 @@ class RunwayEkf:
             P = kalman.predict_dense(P, Phi, Qd, self.blocks.starts)
         else:
             P, D = kalman.predict_ud(P, D, Phi, Qd, self.blocks.starts)
-        return replace(memory, t=t, x=x, shadow=shadow, P=P, D=D)
+        return memory._replace(t=t, x=x, shadow=shadow, P=P, D=D)
 
     def update(self, memory: Memory, measurement: Measurement) -> Memory:
         """Take in one measurement at the memory's time (eqs. 10-12)."""
@@ -117,19 +116,21 @@ class RunwayEkf:
             case "edges":
                 return self._edges(memory, measurement) if memory.valid else memory
             case "gyro":
-                memory = replace(memory, gyro=measurement.z)
                 if not memory.valid:
-                    return memory
+                    return memory._replace(gyro=measurement.z)
                 nu, Hx = gyro_model(memory.x, measurement.z)
-                return self._scalars(memory, Hx, measurement.R, nu)
+                x, P, D, _, _ = self._correct(memory, Hx, measurement.R, nu, _ALL)
+                return memory._replace(x=x, P=P, D=D, gyro=measurement.z)
             case "airspeed":
-                memory = replace(memory, airspeed=float(measurement.z[0]))
+                z = float(measurement.z[0])
                 if not memory.valid:
-                    return memory
-                nu, Hx = airspeed_model(memory.x, measurement.z[0])
-                return self._scalars(memory, Hx, measurement.R, nu)
+                    return memory._replace(airspeed=z)
+                nu, Hx = airspeed_model(memory.x, z)
+                x, P, D, _, _ = self._correct(memory, Hx, measurement.R, nu, _ALL)
+                return memory._replace(x=x, P=P, D=D, airspeed=z)
             case "on_ground":
-                return replace(memory, on_ground=bool(measurement.z[0] > 0.5))
+                down = bool(measurement.z[0] > 0.5)
+                return memory if down == memory.on_ground else memory._replace(on_ground=down)
             case "pose":
                 return self._start(memory, measurement)
         raise ValueError(f"the runway filter does not know measurements of kind {measurement.kind!r}")
@@ -184,7 +185,7 @@ class RunwayEkf:
             off = m.z - x[pose]
             S = self._covariance(memory)[np.ix_(rows, rows)] + m.R
             if off @ np.linalg.solve(S, off) > c.pose_gate**2 * len(pose):
-                return replace(memory, misses=memory.misses + 1)
+                return memory._replace(misses=memory.misses + 1)
         var = self._prior.copy()
         if not memory.valid:
             x[:] = 0.0
@@ -216,7 +217,7 @@ class RunwayEkf:
             alpha = math.atan2(x[states.W], x[states.U])
             shadow = shadow.copy()
             shadow[5] = downwash(x, alpha, shadow[3], self._par)
-        start = replace(memory, valid=True, x=x, shadow=shadow, frames=0, misses=0, rejected=0.0)
+        start = memory._replace(valid=True, x=x, shadow=shadow, frames=0, misses=0, rejected=0.0)
         return self._with_covariance(start, P)
 
     # ------------------------------------------------------------------------------------------- updates
@@ -226,86 +227,55 @@ class RunwayEkf:
 
     def _with_covariance(self, memory: Memory, P: Array) -> Memory:
         if self.config.factorisation == "dense":
-            return replace(memory, P=P, D=None)
+            return memory._replace(P=P, D=None)
         U, D = kalman.ud_factor(P)
-        return replace(memory, P=U, D=D)
+        return memory._replace(P=U, D=D)
 
-    def _process_noise(self, Phi: Array, dt: float, phase: str) -> Array:
-        q = self._q[phase]
-        if self.config.process_noise == "constant":
-            key = (phase, round(dt * 1e6))
-            if key not in self._constant_Q:
-                self._constant_Q[key] = np.diag(q * dt + self._noise_variance)
-            return self._constant_Q[key]
-        Qd: Array = kalman.integrated_noise(Phi, q, dt, self.blocks.starts)
-        Qd += np.diag(self._noise_variance)
-        return Qd
-
-    def _scalars(self, memory: Memory, Hx: Array, R: Array, nu: Array) -> Memory:
-        """Update by ungated scalars; Hx (m, 26)."""
-        P, D, dx, _ = self._kalman(memory, Hx[:, self.blocks.index], R, nu, np.ones(len(nu), dtype=np.bool_))
-        return replace(memory, x=self._moved(memory.x, dx), P=P, D=D)
-
-    def _kalman(
-        self, memory: Memory, Hn: Array, R: Array, nu: Array, use: np.ndarray
-    ) -> tuple[Array, Array | None, Array, float]:
-        Hn = np.ascontiguousarray(Hn)
+    def _correct(
+        self, memory: Memory, Hx: Array, R: Array, nu: Array, use: np.ndarray
+    ) -> tuple[Array, Array, Array | None, Array, float]:
+        """x, P, D after an update with nu, R (m,), Hx (m, 26); the step (n,) and the NIS."""
+        index, starts = self.blocks.index, self.blocks.starts
         if memory.D is None:
-            P, dx, nis = kalman.update_dense(memory.P.copy(), Hn, R, nu, use, self.blocks.starts)
-            return P, None, dx, nis
-        return kalman.update_ud(memory.P.copy(), memory.D.copy(), Hn, R, nu, use, self.blocks.starts)
-
-    def _moved(self, x: Array, dx: Array) -> Array:
-        out = x.copy()
-        out[self.blocks.index] += dx
-        return out
+            x, P, step, nis = correct_dense(memory.x, memory.P, index, starts, Hx, R, nu, use)
+            return x, P, None, step, nis
+        return correct_ud(memory.x, memory.P, memory.D, index, starts, Hx, R, nu, use)  # type: ignore[no-any-return]
 
     def _edges(self, memory: Memory, m: Measurement) -> Memory:
         edges, c = m.geometry, self.config
         if edges is None:
             raise ValueError("a measurement of kind 'edges' needs its EdgeSet")
-        n = len(m.z)
-        found = np.isfinite(m.z)
-        h, Hx = np.empty(n), np.empty((n, states.N))
         starting = memory.frames < c.start_frames
-        x, step = memory.x, np.zeros(len(self.blocks.index))
-        R = np.where(found, m.R + self._extra_R, 1.0)
-        innovation: Array | None = None
-        status = edges.status.copy()
-        use = found
-        for i in range(c.start_iterations if starting else 1):
-            self._predict_edges(x, edges, h, Hx)
-            Hn = np.ascontiguousarray(Hx[:, self.blocks.index])
-            nu = np.where(found, m.z - h, 0.0)
-            if i == 0:
-                innovation = np.where(found, nu, np.nan)
-                use = found & np.isfinite(nu)
-                if not starting and c.gate_sigma is not None:
-                    s = kalman.innovation_variance(self._covariance(memory), Hn, R)
-                    use &= nu * nu <= c.gate_sigma**2 * s
-                    status[found & ~use] = Status.REJECTED
-            nu = nu + Hn @ step
-            R_used = R
-            if starting:  # Huber: an edge far off at the current iterate counts less
-                sd = np.sqrt(R) * c.huber
-                R_used = R * np.maximum(1.0, np.abs(m.z - h) / sd, where=found, out=np.ones(n))
-            P_new, D_new, step, nis = self._kalman(memory, Hn, R_used, nu, use)
-            x = self._moved(memory.x, step)
-        dof = int(use.sum())
-        after = replace(
-            memory,
+        gate, cov = math.inf if starting else self._gate, self._covariance(memory)
+
+        def weighed(x: Array) -> tuple[Array, Array, Array, np.ndarray, Array, np.ndarray, int, int, bool]:
+            return weigh(  # type: ignore[no-any-return]
+                x, cov, self.blocks.index, m.z, m.R, self._extra_R, gate, edges.feature, edges.status, edges.centre,
+                edges.direction, edges.pan, edges.tilt, self._lever, self._focal, self._slope,
+            )  # fmt: skip
+
+        nu, R, Hx, use, innovation, status, found, used, threshold = weighed(memory.x)
+        R_used = R * np.maximum(1.0, np.abs(nu) / (np.sqrt(R) * c.huber)) if starting else R
+        x, P, D, step, nis = self._correct(memory, Hx, R_used, nu, use)
+        for _ in range(c.start_iterations - 1 if starting else 0):
+            # Huber: an edge far off at the current iterate counts less
+            nu, R, Hx, *_ = weighed(x)
+            R_used = R * np.maximum(1.0, np.abs(nu) / (np.sqrt(R) * c.huber))
+            x, P, D, step, nis = self._correct(memory, Hx, R_used, nu + of_index(Hx, self.blocks.index) @ step, use)
+        after = memory._replace(
             x=x,
-            P=P_new,
-            D=D_new,
+            P=P,
+            D=D,
             frames=memory.frames + 1,
-            misses=0 if dof else memory.misses + 1,
-            threshold_in_view=bool(np.any(use & (edges.feature == Feature.THRESHOLD))),
-            residuals=Residuals(innovation if innovation is not None else np.full(n, np.nan), status, nis, dof),
+            misses=0 if used else memory.misses + 1,
+            threshold_in_view=threshold,
+            residuals=Residuals(innovation, status, nis, used),
             reinflated=max(0, memory.reinflated - 1),
+            rejected=self._rejected(memory, found, used),
         )
-        if self._width_filter is not None and after.threshold_in_view and not starting:
+        if self._width_filter is not None and threshold and not starting:
             after = self._widened(after, self._width_filter)
-        return self._watchdog(after, int(found.sum()), dof)
+        return after if after.rejected <= c.watchdog_share else self._opened(after)
 
     def _widened(self, memory: Memory, second: WidthFilter) -> Memory:
         """The second filter's turn, and the scene rescaled to its width."""
@@ -316,22 +286,16 @@ class RunwayEkf:
         width, left = second.update(x[states.WIDTH], memory.width_variance, memory.airspeed, ground, variance)
         x = rescaled(x, width / x[states.WIDTH])
         x[states.WIDTH] = width
-        return replace(memory, x=x, width_variance=left)
+        return memory._replace(x=x, width_variance=left)
 
-    def _predict_edges(self, x: Array, edges: EdgeSet, h: Array, Hx: Array) -> None:
-        edge_model(
-            x, edges.feature, edges.centre, edges.direction, edges.pan, edges.tilt,
-            self._lever, self._focal, self._slope, h, Hx,
-        )  # fmt: skip
-
-    def _watchdog(self, memory: Memory, found: int, used: int) -> Memory:
-        """A filter that rejects what it sees is the one that is wrong: open up and start over from here."""
-        c = self.config
+    def _rejected(self, memory: Memory, found: int, used: int) -> float:
+        """The share of rejected edges, smoothed."""
         if found == 0:
-            return memory
-        share = memory.rejected + ((found - used) / found - memory.rejected) / c.watchdog_memory
-        if share <= c.watchdog_share:
-            return replace(memory, rejected=share)
+            return memory.rejected
+        return memory.rejected + ((found - used) / found - memory.rejected) / self.config.watchdog_memory
+
+    def _opened(self, memory: Memory) -> Memory:
+        """A filter that rejects what it sees is the one that is wrong: open up and start over from here."""
         P = self._covariance(memory) + np.diag(0.25 * self._prior[self.blocks.index])
-        opened = replace(memory, rejected=0.0, frames=c.start_frames - 5, reinflated=16)
+        opened = memory._replace(rejected=0.0, frames=self.config.start_frames - 5, reinflated=16)
         return self._with_covariance(opened, P)

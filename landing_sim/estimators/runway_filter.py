@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -54,9 +54,11 @@ class FilterConfig:
     approach_angle: float = -3.0 * RAD  # believed flight path while nothing is known
 
 
-@dataclass(frozen=True, slots=True)
-class Memory:
-    """All that the filter remembers; never changed in place."""
+_STILL = np.zeros(3)
+
+
+class Memory(NamedTuple):
+    """All that the filter remembers; never changed in place. A tuple: four or five are made a cycle."""
 
     t: float
     valid: bool
@@ -65,7 +67,7 @@ class Memory:
     P: Array  # (n, n) covariance, or U where D is given
     D: Array | None
     airspeed: float = 50.0  # last readings, for the start
-    gyro: Array = field(default_factory=lambda: np.zeros(3))
+    gyro: Array = _STILL
     frames: int = 0  # images since the start (or since the watchdog's last re-inflation)
     misses: int = 0  # images in a row without an edge
     rejected: float = 0.0  # smoothed share

@@ -22,7 +22,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +29,7 @@ import numpy as np
 from bench_parts.baseline import COMPARED, FROM, window
 from bench_parts.flights import land
 from landing_sim.estimators import states
+from landing_sim.estimators.edge_model import edge_model
 from landing_sim.estimators.rewind import Rewind
 from landing_sim.estimators.runway_ekf import RunwayEkf
 from landing_sim.missions.runway_landing import Parts
@@ -85,7 +85,7 @@ class Bound:
         x = true_state(step, self._width)
         for m in step.measurements:
             if self._memory.valid:
-                self._memory = replace(self._memory, x=x)
+                self._memory = self._memory._replace(x=x)
             if m.kind == "edges" and m.geometry is not None:
                 self._edges(step, m, m.geometry, x)
             elif m.kind != "pose" or not self._memory.valid:
@@ -93,19 +93,22 @@ class Bound:
         self._pending.append((t + self._delay, step.command))
         if not self._memory.valid:
             return None
-        self._memory = replace(self._memory, x=x)
+        self._memory = self._memory._replace(x=x)
         return np.sqrt(np.diag(self._memory.P)[:12])
 
     def _edges(self, step: Step, m: Measurement, seen: EdgeSet, x: Array) -> None:
         ekf, found = self._ekf, seen.status == Status.FOUND
         h, Hx = np.empty(len(m.z)), np.empty((len(m.z), states.N))
-        ekf._predict_edges(x, replace(seen, pan=step.camera.pan, tilt=step.camera.tilt), h, Hx)
+        edge_model(
+            x, seen.feature, seen.centre, seen.direction, step.camera.pan, step.camera.tilt,
+            ekf._lever, ekf._focal, ekf._slope, h, Hx,
+        )  # fmt: skip
         R = (m.R + ekf._extra_R)[found]
         self.edge_errors += list((m.z - h)[found] / np.sqrt(R))
         P = self._memory.P
         if found.any():
             P = measured(P, Hx[found][:, ekf.blocks.index], R)
-        self._memory = replace(self._memory, P=P, frames=self._memory.frames + 1)
+        self._memory = self._memory._replace(P=P, frames=self._memory.frames + 1)
 
 
 def one(scenario: Scenario, vehicle: Vehicle) -> tuple[Array, Array, Array, float]:
