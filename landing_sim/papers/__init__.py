@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from landing_sim.papers.paper import Paper
 
-PAPERS = ("dickmanns-1992", "gibert-2015")
+PAPERS = ("dickmanns-1992", "gibert-2015", "sabiron-2014")
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +37,12 @@ def load(name: str) -> Paper:
 
         text = (gibert.NAME, gibert.TITLE, gibert.LEAD, gibert.FIGURES, "Simulations and flights", gibert.RUNS)
         return Paper(*text, gibert.CLAIMS, gibert.perform, gibert_figures.figures)
+    if name == "sabiron-2014":
+        from landing_sim.papers import sabiron_2014 as sabiron
+        from landing_sim.papers import sabiron_figures
+
+        text = (sabiron.NAME, sabiron.TITLE, sabiron.LEAD, sabiron.FIGURES, "Simulations", sabiron.RUNS)
+        return Paper(*text, sabiron.CLAIMS, sabiron.perform, sabiron_figures.figures)
     raise KeyError(f"no such paper: {name!r}; there are: {', '.join(PAPERS)}")
 
 
