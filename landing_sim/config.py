@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Iterable
 from dataclasses import is_dataclass
-from typing import Any, TypeVar, get_args, get_type_hints
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import PydanticCustomError
@@ -40,14 +40,15 @@ def override(document: Document, assignments: Iterable[str]) -> None:
         except ConfigError as error:
             problems += [Problem(mark, tuple(keys), problem.message) for problem in error.problems]
             continue
-        problem = _assign(document, keys, value, mark)
+        problem = assign(document, keys, value, mark)
         if problem:
             problems.append(problem)
     if problems:
         raise ConfigError(problems)
 
 
-def _assign(document: Document, keys: list[str], value: Any, mark: Mark) -> Problem | None:
+def assign(document: Document, keys: list[str], value: Any, mark: Mark) -> Problem | None:
+    """Put a value into a document; what is wrong with it will be said to stand at `mark`. A Problem if it has no place."""
     if len(keys) > MAX_DEPTH:
         return Problem(mark, (), f"nested deeper than {MAX_DEPTH} levels")
     location: Location = ()
@@ -142,9 +143,13 @@ def inconsistent(problems: list[tuple[Location, str]]) -> None:
 
 def _fields(model: Any, location: Location) -> list[str]:
     """Names of the keys known at a location of a model."""
+    named = False  # the key is a name in a mapping of names to models
     for key in location:
-        if not isinstance(key, int):
-            model = _model_in(get_type_hints(model).get(key))
+        if named:
+            named = False
+        elif not isinstance(key, int):
+            annotation = get_type_hints(model).get(key)
+            model, named = _model_in(annotation), get_origin(annotation) is dict
         if model is None:
             return []
     return list(get_type_hints(model)) if model else []

@@ -35,13 +35,34 @@ def aircraft_folder(name: str) -> Path:
 
 def scenario_names() -> tuple[str, ...]:
     """Shipped scenarios, as ``do128/gust``."""
+    return tuple(name for name in _yaml_names() if not _is_campaign(name))
+
+
+def campaign_names() -> tuple[str, ...]:
+    """Shipped campaigns, as ``do128/campaign_wind``."""
+    return tuple(name for name in _yaml_names() if _is_campaign(name))
+
+
+def _yaml_names() -> tuple[str, ...]:
     folder = data_folder("scenarios")
     return tuple(sorted(p.relative_to(folder).with_suffix("").as_posix() for p in folder.glob("*/*.yaml")))
 
 
+def _is_campaign(name: str) -> bool:
+    return name.rpartition("/")[2].startswith("campaign")
+
+
 def scenario_file(name: str) -> Path:
     """A shipped scenario's file by its name, else the path as given. Raises ConfigError if there is neither."""
-    names = scenario_names()
+    return _file(name, scenario_names(), "scenario")
+
+
+def campaign_file(name: str) -> Path:
+    """A shipped campaign's file by its name, else the path as given. Raises ConfigError if there is neither."""
+    return _file(name, campaign_names(), "campaign")
+
+
+def _file(name: str, names: tuple[str, ...], kind: str) -> Path:
     if name in names:
         return data_folder("scenarios") / f"{name}.yaml"
     path = Path(name)
@@ -51,6 +72,4 @@ def scenario_file(name: str) -> Path:
     except (OSError, ValueError):  # too long, or a NUL inside: certainly no file
         pass
     near = did_you_mean(name, names) or did_you_mean(f"do128/{name}", names)
-    raise ConfigError(
-        [Problem(Mark(name), (), f"no such file or shipped scenario{near}; `landing-sim list` shows them")]
-    )
+    raise ConfigError([Problem(Mark(name), (), f"no such file or shipped {kind}{near}; `landing-sim list` shows them")])

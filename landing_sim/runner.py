@@ -19,6 +19,7 @@ import numpy as np
 from landing_sim.errors import Mark, Problem, ScenarioError
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.missions import runway_landing
+from landing_sim.noise import NoiseStream
 from landing_sim.plants.jsbsim import PlantError
 from landing_sim.record import judge, log, parquet
 from landing_sim.record.overlay import BelievedCamera
@@ -50,18 +51,20 @@ def fly(
     watch: Callable[[Step], None] | None = None,
     recording: Path | None = None,
     live: bool = False,
+    noise: Callable[[str], NoiseStream] | None = None,
 ) -> Flight:
     """Fly it to its end.
 
     watch : called with every step
     recording : where to write one for the viewer; None leaves it out
     live : show it in the viewer while it flies; needs a recording
+    noise : the stream of a named component, instead of those of the scenario's seed and run
 
     Raises ScenarioError where the aircraft cannot fly what the scenario wants at the start, ReplayError from the recording.
     """
     started = time.perf_counter()
     try:
-        mission = MISSIONS[scenario.mission](scenario, vehicle, scenario.seed)
+        mission = MISSIONS[scenario.mission](scenario, vehicle, scenario.seed, scenario.run, noise)
     except (PlantError, ValueError) as error:
         raise ScenarioError([Problem(Mark(scenario.name), (), f"cannot be flown: {error}")]) from error
     listeners = [] if watch is None else [watch]

@@ -21,10 +21,10 @@ from landing_sim.config import Section, inconsistent
 from landing_sim.errors import ConfigError, Location, Problem, ScenarioError, did_you_mean
 from landing_sim.sections import wind
 from landing_sim.sections.judged import LANDING, Criterion, Record
-from landing_sim.sections.onboard import Believed, Control, Filter, Observer, Vision
+from landing_sim.sections.onboard import Believed, Control, Filter, Guidance, Observer, Vision
 from landing_sim.sections.sensors import Camera, Sensors
 from landing_sim.sections.wind import Wind
-from landing_sim.sections.world import Aircraft, Initial, Runway, Time
+from landing_sim.sections.world import Aircraft, Atmosphere, Initial, Runway, Time
 
 __all__ = ["MODELS", "Scenario", "Time", "dump", "load", "schema", "schema_text"]
 
@@ -39,10 +39,12 @@ class Scenario(Section):
     )
     description: str = Field("", max_length=2000, description="what it is for")
     seed: int = Field(1, ge=0, lt=2**63, description="root of all random numbers")
+    run: int = Field(0, ge=0, lt=2**32, description="of a campaign: independent random numbers under the same seed")
     time: Time = Field(Time(), description="clock")
     aircraft: Aircraft = Field(Aircraft(), description="vehicle")
     initial: Initial = Field(Initial(), description="start of the flight")
     runway: Runway = Field(Runway(), description="the true runway")
+    atmosphere: Atmosphere = Field(Atmosphere(), description="still air")
     wind: Wind = Field(Wind(), description="moving air")
     camera: Camera = Field(Camera(), description="the true camera")
     sensors: Sensors = Field(Sensors(), description="other sensors")
@@ -50,6 +52,7 @@ class Scenario(Section):
     filter: Filter = Field(Filter(), description="estimator")
     observer: Observer = Field(Observer(), description="range observer, where filter.kind says so")
     believed: Believed = Field(Believed(), description="onboard models against the truth")
+    guidance: Guidance = Field(Guidance(), description="path")
     control: Control = Field(Control(), description="controller")
     record: Record = Field(Record(), description="outputs")
     criteria: tuple[Criterion, ...] = Field(

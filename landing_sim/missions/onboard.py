@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from landing_sim.control.design import Design, LinearModel, design
+from landing_sim.control.guidance import LandingGuidance
+from landing_sim.control.offset import OffsetGuidance
 from landing_sim.control.settings import ControlSettings
 from landing_sim.estimators.mismatch import offset_sigma
 from landing_sim.estimators.observer.gibert import Gibert, GibertConfig
@@ -20,9 +22,8 @@ from landing_sim.estimators.rewind import Rewind
 from landing_sim.estimators.runway_ekf import RunwayEkf
 from landing_sim.estimators.runway_filter import FilterConfig
 from landing_sim.geometry.pinhole import Intrinsics
-from landing_sim.interfaces import Estimator, FrontEnd
+from landing_sim.interfaces import Estimator, FrontEnd, Guidance, NoiseStream
 from landing_sim.missions import truth
-from landing_sim.noise import Noise
 from landing_sim.plants.trim import linearise, trim
 from landing_sim.scenario import Scenario
 from landing_sim.signals import Feature
@@ -32,6 +33,7 @@ from landing_sim.vision.front_end import FrontEndConfig, RunwayFrontEnd
 from landing_sim.vision.windows import EdgeConfig
 from landing_sim.world.markings import stripe_count
 
+STANDARD, LAPSE = 288.15, 0.0065  # [K] at sea level, [K/m]: the standard atmosphere
 NOMINAL_WIDTH = 45.0  # [m] what an unknown runway is drawn with until its own motion tells
 
 
@@ -92,7 +94,7 @@ def _map(scenario: Scenario, brighter: bool) -> RunwayMap:
     )
 
 
-def estimator(scenario: Scenario, vehicle: Vehicle, camera: BelievedCamera, noise: Noise) -> Estimator:
+def estimator(scenario: Scenario, vehicle: Vehicle, camera: BelievedCamera, noise: NoiseStream) -> Estimator:
     """The filter or observer that is asked for, with the aircraft believed to be a little different from what it is."""
     f, b = scenario.filter, scenario.believed
     if f.kind == "observer":
@@ -169,14 +171,24 @@ def _gate(wanted: float | str | None, kind: str) -> float | None:
 
 
 def _air_density(scenario: Scenario) -> float:
-    """[kg/m^3] of the standard atmosphere where the approach begins: what an altimeter tells the crew."""
+    """[kg/m^3] half-way down the approach: what altimeter and thermometer tell the crew."""
     height = scenario.runway.elevation_m + 0.5 * scenario.initial.height_m
-    return 1.225 * (1.0 - 0.0065 * height / 288.15) ** 4.2559
+    return _density(height, scenario.atmosphere.temperature_offset_K)
+
+
+def _density(height: float, warmer: float) -> float:
+    """[kg/m^3] at `height` [m], below 11 km, in an atmosphere that is `warmer` [K] than the standard one at any height."""
+    sea_level = STANDARD + warmer
+    return 1.225 * (1.0 - LAPSE * height / sea_level) ** 4.2559 * (STANDARD / sea_level)
 
 
 def prepared(scenario: Scenario, vehicle: Vehicle) -> Vehicle:
     """The vehicle for this approach: a crew knows its mass and the steady headwind."""
     mass = vehicle.mass_kg if scenario.aircraft.mass_kg is None else scenario.aircraft.mass_kg
+    glide = scenario.guidance.glide_deg
+    if glide is not None:
+        path = replace(vehicle.guidance.path, glide_deg=glide)
+        vehicle = vehicle.model_copy(update={"guidance": replace(vehicle.guidance, path=path)})
     return vehicle.prepared(mass, scenario.wind.headwind_mps, _air_density(scenario))
 
 
@@ -186,18 +198,37 @@ def control_settings(scenario: Scenario, vehicle: Vehicle) -> ControlSettings:
     return replace(c, flap=c.flap if flap is None else flap, **axes)
 
 
+def guidance(scenario: Scenario, vehicle: Vehicle) -> Guidance:
+    """Glide, flare and rollout, on a line that may lie beside the centreline."""
+    g = LandingGuidance(vehicle.guidance, math.atan(scenario.runway.slope_percent / 100.0))
+    offset = scenario.guidance.lateral_offset_m
+    return g if offset == 0.0 else OffsetGuidance(g, offset)
+
+
+def density_altitude(scenario: Scenario) -> float:
+    """[m] where the standard atmosphere is as dense as the runway's air: what gains are planned for."""
+    density = _density(scenario.runway.elevation_m, scenario.atmosphere.temperature_offset_K)
+    return STANDARD / LAPSE * (1.0 - (density / 1.225) ** (1.0 / 4.2559))
+
+
 _designs: dict[tuple[Path, str], Design] = {}
+_DESIGNS = 8  # kept: a campaign needs another one each landing
 
 
-def planned_design(folder: Path, settings: ControlSettings, mass: float) -> Design:
-    """Gains from the nominal aircraft, never from the dispersed one; made once a process."""
-    key = (folder, f"{mass!r} {settings!r}")
+def planned_design(folder: Path, settings: ControlSettings, mass: float, altitude: float = 0.0) -> Design:
+    """Gains from the nominal aircraft, never from the dispersed one, kept for the next flight of this process.
+
+    altitude : [m] of the runway in the standard atmosphere
+    """
+    key = (folder, f"{mass!r} {altitude!r} {settings!r}")
     if key not in _designs:
-        _designs[key] = design(settings, linear_models(folder, settings, mass))
+        while len(_designs) >= _DESIGNS:
+            del _designs[next(iter(_designs))]
+        _designs[key] = design(settings, linear_models(folder, settings, mass, altitude))
     return _designs[key]
 
 
-def linear_models(folder: Path, settings: ControlSettings, mass: float) -> list[LinearModel]:
+def linear_models(folder: Path, settings: ControlSettings, mass: float, altitude: float = 0.0) -> list[LinearModel]:
     """The nominal aircraft linearised at the controller's trim points; a stabiliser stays where the first one has it."""
     models = []
     stabiliser: float | None = None
@@ -208,6 +239,7 @@ def linear_models(folder: Path, settings: ControlSettings, mass: float) -> list[
             math.radians(wanted.flight_path_deg),
             settings.flap,
             mass,
+            altitude + 50.0,
             stabiliser=stabiliser,
         )
         stabiliser = point.stabiliser

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from landing_sim import loop, paths
-from landing_sim.control.guidance import LandingGuidance
 from landing_sim.control.landing_lq import LandingController
-from landing_sim.interfaces import Estimator, FrontEnd, Sensor
+from landing_sim.interfaces import Estimator, FrontEnd, Guidance, NoiseStream, Sensor
 from landing_sim.missions import onboard, truth
 from landing_sim.noise import Noise
 from landing_sim.plants.aircraft import JsbsimPlant
@@ -45,7 +44,7 @@ class Parts:
     sensors: tuple[Sensor, ...]
     front_ends: dict[str, FrontEnd]
     estimator: Estimator
-    guidance: LandingGuidance
+    guidance: Guidance
     controller: LandingController
 
 
@@ -112,11 +111,21 @@ class Mission:
         return ""
 
 
-def build(scenario: Scenario, vehicle: Vehicle, seed: int, run: int = 0) -> Mission:
-    """Everything one flight needs. `run` selects independent random streams under the same seed."""
+def build(
+    scenario: Scenario,
+    vehicle: Vehicle,
+    seed: int,
+    run: int = 0,
+    noise: Callable[[str], NoiseStream] | None = None,
+) -> Mission:
+    """Everything one flight needs. `run` selects independent random streams under the same seed.
 
-    def noise(name: str) -> Noise:
-        return Noise(seed, name, run)
+    noise : the stream of a named component, instead of those of seed and run
+    """
+    if noise is None:
+
+        def noise(name: str) -> Noise:
+            return Noise(seed, name, run)
 
     vehicle = onboard.prepared(scenario, vehicle)
     clock = loop.Clock.of(scenario.time.step_s, scenario.time.cycle_s, scenario.control.delay_s)
@@ -125,7 +134,9 @@ def build(scenario: Scenario, vehicle: Vehicle, seed: int, run: int = 0) -> Miss
     plant = truth.plant(scenario, vehicle, platform, wind)
     camera = onboard.believed_camera(scenario, vehicle)
     settings = onboard.control_settings(scenario, vehicle)
-    planned = onboard.planned_design(paths.aircraft_folder(scenario.aircraft.model), settings, vehicle.mass_kg)
+    planned = onboard.planned_design(
+        paths.aircraft_folder(scenario.aircraft.model), settings, vehicle.mass_kg, onboard.density_altitude(scenario)
+    )
     return Mission(
         scenario,
         Parts(
@@ -135,7 +146,7 @@ def build(scenario: Scenario, vehicle: Vehicle, seed: int, run: int = 0) -> Miss
             truth.sensors(scenario, platform, noise),
             onboard.front_ends(scenario, camera),
             onboard.estimator(scenario, vehicle, camera, noise("believed")),
-            LandingGuidance(vehicle.guidance, math.atan(scenario.runway.slope_percent / 100.0)),
+            onboard.guidance(scenario, vehicle),
             LandingController(planned, (platform.pan, platform.tilt)),
         ),
     )

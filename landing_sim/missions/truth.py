@@ -11,7 +11,7 @@ from landing_sim import paths
 from landing_sim.geometry.earth import RunwayFrame
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.interfaces import Sensor
-from landing_sim.noise import Noise
+from landing_sim.noise import NoiseStream
 from landing_sim.plants.aircraft import InitialState, JsbsimPlant
 from landing_sim.scenario import Scenario
 from landing_sim.sections.wind import Wind as WantedWind
@@ -85,7 +85,7 @@ def _steady(w: WantedWind) -> SteadyWind | LogWind | CertificationWind:
     )
 
 
-def wind(scenario: Scenario, noise: Noise) -> Wind:
+def wind(scenario: Scenario, noise: NoiseStream) -> Wind:
     """All that moves the air."""
     w = scenario.wind
     config = WindConfig(
@@ -105,7 +105,7 @@ def wind(scenario: Scenario, noise: Noise) -> Wind:
     return Wind(config, noise, scenario.runway.slope_percent / 100.0)
 
 
-def platform(scenario: Scenario, vehicle: Vehicle, noise: Noise) -> PanTilt | Strapdown:
+def platform(scenario: Scenario, vehicle: Vehicle, noise: NoiseStream) -> PanTilt | Strapdown:
     """The camera mount: bolted down, or turned by an operator to where the runway is thought to be."""
     if vehicle.camera.fixed_tilt_deg is not None:
         return Strapdown(math.radians(vehicle.camera.fixed_tilt_deg))
@@ -139,6 +139,7 @@ def plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt | Strapdown, w
         flap=vehicle.control.flap if a.flap is None else a.flap,
         mass=a.mass_kg,
         cg_offset_B=(a.cg_offset_m, 0.0, 0.0),
+        temperature_offset=scenario.atmosphere.temperature_offset_K,
     )
     return JsbsimPlant(
         paths.aircraft_folder(a.model),
@@ -152,7 +153,9 @@ def plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt | Strapdown, w
     )
 
 
-def sensors(scenario: Scenario, platform: PanTilt | Strapdown, noise: Callable[[str], Noise]) -> tuple[Sensor, ...]:
+def sensors(
+    scenario: Scenario, platform: PanTilt | Strapdown, noise: Callable[[str], NoiseStream]
+) -> tuple[Sensor, ...]:
     """Inertial first: what the camera's front end is told rests on them."""
     cycle, c, p, s = scenario.time.cycle_s, scenario.camera, scenario.camera.platform, scenario.sensors
     bias = math.radians(p.encoder_bias_deg)

@@ -53,6 +53,7 @@ class InitialState:
     mass: float | None = None  # [kg]; None: the flight model's own
     cg_offset_B: tuple[float, float, float] = (0.0, 0.0, 0.0)  # [m] of the actual cg from the nominal
     on_ground: bool = False
+    temperature_offset: float = 0.0  # [K] warmer than the standard atmosphere
 
 
 @dataclass(slots=True)
@@ -127,7 +128,9 @@ class JsbsimPlant:
     def reset(self) -> Truth:
         """A fresh flight model at the initial state; the same bits every time. Raises PlantError."""
         s = self._initial
-        self._model = model = FlightModel(self._folder, self.dt, s.mass, np.array(s.cg_offset_B))
+        self._model = model = FlightModel(
+            self._folder, self.dt, s.mass, np.array(s.cg_offset_B), s.temperature_offset
+        )
         self._contacts = read_contacts(self._folder / f"{self._folder.name}.xml", model.nominal_cg)
         n = len(self._contacts.names)
         self._height, self._bristle, self._reaction = np.full(n, math.inf), np.zeros((n, 2)), np.zeros(6)

@@ -43,11 +43,19 @@ class FlightModel:
     dt : [s], fixed for the life of the object
     mass : [kg] total; None keeps the file's. Needs a pointmass in the file to take up the difference.
     cg_offset_B : (3,) [m] of the actual cg from the nominal one (the file's), body axes
+    temperature_offset : [K] warmer than the standard atmosphere, at any height
 
     Raises PlantError.
     """
 
-    def __init__(self, folder: Path, dt: float, mass: float | None = None, cg_offset_B: Array | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        dt: float,
+        mass: float | None = None,
+        cg_offset_B: Array | None = None,
+        temperature_offset: float = 0.0,
+    ) -> None:
         name, folder = folder.name, folder.resolve()
         if not (folder / f"{name}.xml").is_file():
             raise PlantError(f"no flight model {folder / (name + '.xml')}")
@@ -67,6 +75,8 @@ class FlightModel:
         self._properties = fdm.get_property_manager()
         self._bind(fdm.get_propulsion().get_num_engines())
         self._lift_contacts()
+        if temperature_offset:
+            self.set("atmosphere/delta-T", 1.8 * temperature_offset)  # Rankine
         self.cg_offset_B = np.zeros(3) if cg_offset_B is None else np.array(cg_offset_B, dtype=float)
         fdm.run_ic()
         self.nominal_cg = np.array([self.get(f"inertia/cg-{a}-in") for a in "xyz"]) * INCH  # structural frame

@@ -93,3 +93,12 @@ class Control(Section):
     rho: float = Field(
         0.1, ge=0, le=100, description="weight of plain LQ against the prescribed eigenstructure (0 = exact)"
     )
+
+
+class Guidance(Section):
+    """The path that is flown, where it is not the vehicle's own."""
+
+    glide_deg: float | None = Field(None, ge=1, le=8, description="angle of the glide path; null = the vehicle's")
+    lateral_offset_m: float = Field(
+        0.0, ge=-20, le=20, description="guidance takes a line this far right (+) of the centreline for it"
+    )

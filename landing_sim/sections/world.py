@@ -44,6 +44,12 @@ class Initial(Section):
     flight_path_deg: float = Field(-3.0, ge=-15, le=15, description="air-relative flight path angle, climb positive")
 
 
+class Atmosphere(Section):
+    """The still air: the standard atmosphere, shifted."""
+
+    temperature_offset_K: float = Field(0.0, ge=-100, le=60, description="warmer (+) than the standard by this")
+
+
 class Taxiway(Section):
     """An exit: the runway's edge is missing along its mouth."""
 

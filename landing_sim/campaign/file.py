@@ -1,0 +1,328 @@
+"""A campaign file: which scenario, what is dispersed how, how often it is flown, and which risks must be shown.
+
+What is wrong in it is said with file:line:column before anything flies: every path is put into the scenario with the
+ends of its distribution, so a value that the scenario refuses is found now and not in landing 1713.
+"""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args
+
+from pydantic import Field
+
+from landing_sim import config, paths, scenario, yamlfile
+from landing_sim.campaign.distributions import Correlation, Derived, Distribution, Unit, derive, extremes, quantile
+from landing_sim.campaign.units import factor
+from landing_sim.config import Section
+from landing_sim.errors import ConfigError, Location, Mark, Problem, ScenarioError, did_you_mean
+from landing_sim.sections.judged import Metric
+
+EXTRA_METRICS = ("touchdown_sideslip_deg", "gear_height_60m_m")
+"""What a campaign judges beyond `record.judge.measure`."""
+METRICS: tuple[str, ...] = (*get_args(Metric), *EXTRA_METRICS)
+
+
+class CampaignError(ConfigError):
+    """A campaign that cannot be flown as written."""
+
+
+class Risk(Section):
+    """An event that must be rare: a figure of the flight above or below a limit."""
+
+    name: str = Field(min_length=1, max_length=100, description="what the event is called")
+    metric: str = Field(description="a criterion's metric, touchdown_sideslip_deg or gear_height_60m_m")
+    above: float | None = Field(None, description="the event is a value above this; null = none")
+    below: float | None = Field(None, description="the event is a value below this; null = none")
+    probability: float = Field(gt=0, lt=1, description="what must be shown: the event is rarer than this")
+    source: str = Field("", max_length=200, description="where the limit comes from")
+
+
+class Sweep(Section):
+    """One value held in turn at each of several: landing k flies with values[k % n]. What a limit campaign does."""
+
+    path: str = Field(description="path of the scenario's value")
+    values: tuple[float, ...] = Field(min_length=1, max_length=1000, description="in the order they are tried")
+    unit: Unit = None
+    aim: float | None = Field(None, description="the one that the campaign's verdict is about; null = the last")
+
+
+class Campaign(Section):
+    """Many landings of one scenario."""
+
+    schema_version: Literal[1] = Field(description="version of this format")
+    scenario: str = Field(min_length=1, description="a shipped scenario, or a file beside this one")
+    name: str = Field(
+        "", max_length=100, pattern=r"^[^/\\\x00-\x1f\x7f]*$", description="short name; the file's own if left out"
+    )
+    description: str = Field("", max_length=2000, description="what it is for")
+    runs: int = Field(1000, ge=1, le=10_000_000, description="landings")
+    seed: int = Field(1, ge=0, lt=2**63, description="root of all random numbers")
+    sampling: Literal["random", "sobol"] = Field(
+        "random", description="independent draws, or a scrambled Sobol sequence over all that is drawn"
+    )
+    keep: Literal["all", "none", "failures"] = Field(
+        "failures",
+        description="time histories: of all landings, none, or those that did not land or met a risk's event",
+    )
+    set: dict[str, Any] = Field({}, description="values of the scenario that are other than in its file, by path")
+    variables: dict[Annotated[str, Field(pattern=r"^[A-Za-z]\w*$")], Distribution] = Field(
+        {}, description="drawn values that are none of the scenario's, for others to be derived from"
+    )
+    dispersions: dict[str, Distribution] = Field({}, description="values of the scenario that are dispersed, by path")
+    correlations: tuple[Correlation, ...] = Field((), max_length=100, description="between what is drawn")
+    sweep: Sweep | None = Field(None, description="null = everything is dispersed")
+    risks: tuple[Risk, ...] = Field((), max_length=100, description="what the verdict is about")
+
+    def drawn(self) -> dict[str, Distribution]:
+        """What takes a random number, by name or path; in the file's order, which is that of Sobol dimensions."""
+        return {name: d for name, d in self._all().items() if d.derived is None}
+
+    def _all(self) -> dict[str, Distribution]:
+        return {**self.variables, **self.dispersions}
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A campaign and the scenario it disperses, resolved: all that a worker on another machine needs."""
+
+    campaign: Campaign
+    scenario: Mapping[str, Any]  # as scenario.dump gives it, with the campaign's `set` in it
+    label: str  # the campaign as the user named it
+
+    def identity(self) -> str:
+        """Changes with whatever would change a landing: not with the number of landings, risks or texts."""
+        kept = self.campaign.model_dump(
+            mode="json", exclude={"runs", "name", "description", "scenario", "set", "risks", "keep"}
+        )
+        scenario = {
+            key: value for key, value in self.scenario.items() if key not in ("name", "description", "criteria")
+        }
+        digest = hashlib.sha256(json.dumps([kept, scenario], sort_keys=True).encode())
+        folder = paths.aircraft_folder(str(self.scenario["aircraft"]["model"]))
+        for file in sorted(p for p in folder.rglob("*") if p.suffix in (".xml", ".yaml")):
+            digest.update(file.relative_to(folder).as_posix().encode())
+            digest.update(file.read_bytes())
+        return digest.hexdigest()
+
+
+def load(name: str | Path, runs: int | None = None) -> Plan:
+    """Read and check a campaign; `runs` instead of the file's.
+
+    name : a path, or the name of a shipped campaign such as ``do128/campaign_wind``
+
+    Raises CampaignError holding every problem with its place.
+    """
+    try:
+        path = paths.campaign_file(str(name))
+        document = yamlfile.load(path)
+        if runs is not None:
+            config.override(document, [f"runs={runs}"])
+        if document.data.get("name") in (None, ""):
+            document.data["name"] = path.stem
+        campaign = config.validate(document, Campaign)
+        problems = [*_units(campaign), *_names(campaign), *_risks(campaign)]
+        if problems:
+            raise ConfigError(_placed(document, problems))
+        return Plan(campaign, _resolved(campaign, document, path), str(name))
+    except ConfigError as error:
+        raise CampaignError(error.problems) from None
+
+
+def schema_text() -> str:
+    """The JSON Schema of campaign files, as shipped in scenarios/schema_campaign.json."""
+    out = Campaign.model_json_schema()
+    out["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    out["title"] = "landing-sim campaign"
+    return json.dumps(out, indent=1, ensure_ascii=False) + "\n"
+
+
+# ---------------------------------------------------------------------------------------------------- checks
+
+Wrong = tuple[Location, str]
+
+
+def _placed(document: yamlfile.Document, problems: list[Wrong]) -> list[Problem]:
+    return sorted(
+        (Problem(document.mark(where), where, message) for where, message in problems),
+        key=lambda problem: (problem.mark.line, problem.mark.column),
+    )
+
+
+def _units(campaign: Campaign) -> Iterator[Wrong]:
+    for section in ("variables", "dispersions"):
+        for name, distribution in getattr(campaign, section).items():
+            kind = next(k for k in type(distribution).model_fields if getattr(distribution, k) is not None)
+            yield from _unit(name, distribution.unit, (section, name, kind, "unit"))
+    if campaign.sweep is not None:
+        yield from _unit(campaign.sweep.path, campaign.sweep.unit, ("sweep", "unit"))
+
+
+def _unit(name: str, unit: str | None, where: Location) -> Iterator[Wrong]:
+    try:
+        factor(name, unit)
+    except ValueError as error:
+        yield where, str(error)
+
+
+def _names(campaign: Campaign) -> Iterator[Wrong]:
+    above: list[str] = []
+    for section in ("variables", "dispersions"):
+        for name, distribution in getattr(campaign, section).items():
+            if name in above:
+                yield (section, name), "is a variable's name as well"
+            if distribution.derived is not None:
+                for part in distribution.derived.parts:
+                    if part not in above:
+                        near = did_you_mean(part, above)
+                        yield (section, name, "derived", "of"), f"nothing above is called {part!r}{near}"
+            above.append(name)
+    for path in campaign.dispersions:
+        if path in campaign.set:
+            yield ("dispersions", path), "stands under `set` as well"
+    drawn, met = campaign.drawn(), set[str]()
+    for i, group in enumerate(campaign.correlations):
+        for name in group.of:
+            if name not in drawn:
+                yield ("correlations", i, "of"), f"nothing that is drawn is called {name!r}{did_you_mean(name, drawn)}"
+            if name in met:
+                yield ("correlations", i, "of"), f"{name!r} stands in two groups: make them one"
+            met.add(name)
+    sweep = campaign.sweep
+    if sweep is not None:
+        if sweep.path in campaign.set or sweep.path in campaign.dispersions:
+            yield ("sweep", "path"), "is set or dispersed as well"
+        if sweep.aim is not None and sweep.aim not in sweep.values:
+            yield ("sweep", "aim"), f"is none of values = {', '.join(f'{v:g}' for v in sweep.values)}"
+        if len(set(sweep.values)) < len(sweep.values):
+            yield ("sweep", "values"), "a value stands there twice"
+
+
+def _risks(campaign: Campaign) -> Iterator[Wrong]:
+    seen = set[str]()
+    for i, risk in enumerate(campaign.risks):
+        if risk.metric not in METRICS:
+            yield ("risks", i, "metric"), f"no such metric{did_you_mean(risk.metric, METRICS)}"
+        if risk.above is None and risk.below is None:
+            yield ("risks", i), "needs above, below or both"
+        elif risk.above is not None and risk.below is not None and risk.below >= risk.above:
+            yield ("risks", i, "below"), f"must be below above = {risk.above:g}: the event lies outside"
+        if risk.name in seen:
+            yield ("risks", i, "name"), "another risk has this name"
+        seen.add(risk.name)
+
+
+def _resolved(campaign: Campaign, document: yamlfile.Document, path: Path) -> dict[str, Any]:
+    """The scenario with `set` in it, checked with every value at the ends of what it may take. Raises ConfigError."""
+    base = _scenario_document(campaign, document, path)
+    _put(base, campaign.set, document, "set")
+    resolved = scenario.dump(_check(base, campaign, document, dict.fromkeys(campaign.drawn(), 0.0), 0))
+    problems: dict[tuple[str, int], Problem] = {}
+
+    def attempt(z: Mapping[str, float], run: int, raw: Mapping[str, Any]) -> None:
+        try:
+            _check(base, campaign, document, z, run, raw)
+        except ConfigError as error:
+            for problem in error.problems:
+                problems.setdefault((problem.mark.source, problem.mark.line), problem)
+
+    middle = dict.fromkeys(campaign.drawn(), 0.0)
+    for name, distribution in campaign.drawn().items():
+        for value in extremes(distribution):
+            attempt(middle, 0, {name: value})
+    for k in range(len(campaign.sweep.values) if campaign.sweep else 0):
+        attempt(middle, k, {})
+    if problems:
+        raise ConfigError(sorted(problems.values(), key=lambda p: (p.mark.line, p.mark.column)))
+    return resolved
+
+
+def _scenario_document(campaign: Campaign, document: yamlfile.Document, path: Path) -> yamlfile.Document:
+    names = paths.scenario_names()
+    beside = path.parent / campaign.scenario
+    file = beside if campaign.scenario not in names and beside.is_file() else None
+    try:
+        found = yamlfile.load(file or paths.scenario_file(campaign.scenario))
+    except ConfigError as error:
+        where: Location = ("scenario",)
+        if file is not None or any(p.mark.source.endswith((".yaml", ".yml")) and p.location for p in error.problems):
+            raise
+        raise ConfigError([Problem(document.mark(where), where, error.problems[0].message)]) from None
+    if found.data.get("name") in (None, ""):
+        found.data["name"] = Path(campaign.scenario).stem
+    scenario.check(copy.deepcopy(found))  # what is wrong in it is its own
+    return found
+
+
+def _put(
+    base: yamlfile.Document, values: Mapping[str, Any], document: yamlfile.Document, section: str | None = None
+) -> None:
+    """Values by path into a scenario's document, blamed on their place in the campaign's. Raises ConfigError."""
+    problems = []
+    for path, value in values.items():
+        where: Location = ("sweep", "path") if section is None else (section, path)
+        mark = document.mark(where, key=section is not None)
+        keys = path.split(".")
+        if not all(re.fullmatch(r"\w+", key) for key in keys):
+            problems.append(Problem(mark, where, "is not a path of keys with dots between them"))
+            continue
+        problem = config.assign(base, keys, value, mark)
+        if problem is not None:
+            problems.append(problem)
+    if problems:
+        raise ConfigError(problems)
+
+
+def _check(
+    base: yamlfile.Document,
+    campaign: Campaign,
+    document: yamlfile.Document,
+    z: Mapping[str, float],
+    run: int,
+    raw: Mapping[str, Any] | None = None,
+) -> scenario.Scenario:
+    """The scenario for these normals. `raw` are values instead of quantiles, in the file's own units."""
+    trial = copy.deepcopy(base)
+    values = assemble(campaign, z, run, raw or {})
+    _put(trial, {path: values[path] for path in campaign.dispersions}, document, "dispersions")
+    if campaign.sweep is not None:
+        _put(trial, {campaign.sweep.path: values[campaign.sweep.path]}, document)
+    try:
+        return scenario.check(trial)
+    except ConfigError as error:
+        problems = [
+            Problem(p.mark, p.location, f"{p.message}: limit what is drawn" if raw else p.message)
+            for p in error.problems
+        ]
+        raise ConfigError(problems) from None
+
+
+def assemble(
+    campaign: Campaign, z: Mapping[str, float], run: int, raw: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Every drawn, derived and swept value of a landing, by name or path, in the units of their names.
+
+    z : (correlated) standard normal of everything drawn
+    raw : values instead of quantiles, in the file's own units
+    """
+    values: dict[str, Any] = {}
+    for name, distribution in {**campaign.variables, **campaign.dispersions}.items():
+        if isinstance(distribution.kind, Derived):
+            values[name] = derive(distribution.kind, values)
+            continue
+        value = raw[name] if raw and name in raw else quantile(distribution, z[name])
+        scale = factor(name, distribution.unit)
+        values[name] = value if scale == 1.0 else scale * value
+    if campaign.sweep is not None:
+        sweep = campaign.sweep
+        values[sweep.path] = sweep.values[run % len(sweep.values)] * factor(sweep.path, sweep.unit)
+    return values
+
+
+__all__ = ["METRICS", "Campaign", "CampaignError", "Mark", "Plan", "Risk", "ScenarioError", "Sweep", "load"]
