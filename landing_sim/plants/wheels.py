@@ -28,6 +28,8 @@ TANGENTIAL_DAMPING = 0.12  # [s] of the tangential stiffness: bristles at rest s
 RELAXATION = 0.35  # [m] sigma: some half a wheel diameter
 NO_BRAKE, LEFT, RIGHT = 0.0, 1.0, 2.0
 
+Vector = tuple[float, float, float]
+
 
 @dataclass(frozen=True, slots=True)
 class Contacts:
@@ -90,33 +92,52 @@ def heights(p_RB: Array, R_RB: Array, slope: float, p_B: Array, out: Array) -> f
 
 
 @kernel
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@kernel
 def reactions(
     R_RB: Array, v_R: Array, w_B: Array, slope: float, brake_left: float, brake_right: float, dt: float,
     p_B: Array, values: Array, height: Array, bristle: Array, out: Array,
 ) -> None:  # fmt: skip
-    """Force [N] and moment about B's origin [N m], body axes, into out (6,).
+    """Force [N] and moment about B's origin [N m], body axes, into the rows of out (2, 3).
 
     v_R (3,) [m/s] of B's origin; w_B (3,) [rad/s]; height (n,) [m] from `heights`; bristle (n, 2) [m] along and across,
     carried from step to step.
     """
-    out[:] = 0.0
-    n = np.array([-math.sin(slope), 0.0, -math.cos(slope)])  # the surface's normal, upwards
-    n_B, v_B = R_RB.T @ n, R_RB.T @ v_R
+    x, z = -math.sin(slope), -math.cos(slope)  # the surface's normal in R, upwards; then in B
+    n = (R_RB[0, 0] * x + R_RB[2, 0] * z, R_RB[0, 1] * x + R_RB[2, 1] * z, R_RB[0, 2] * x + R_RB[2, 2] * z)
     # along: body x laid on the surface; across: to its right
-    along = np.array([1.0, 0.0, 0.0]) - n_B[0] * n_B
-    along /= math.sqrt(along @ along)
-    across = -np.cross(n_B, along)
+    flat = math.sqrt((1.0 - n[0] * n[0]) ** 2 + (n[0] * n[1]) ** 2 + (n[0] * n[2]) ** 2)
+    along = ((1.0 - n[0] * n[0]) / flat, -n[0] * n[1] / flat, -n[0] * n[2] / flat)
+    across = _cross(along, n)
+    turn = (w_B[0], w_B[1], w_B[2])
+    v = (
+        R_RB[0, 0] * v_R[0] + R_RB[1, 0] * v_R[1] + R_RB[2, 0] * v_R[2],
+        R_RB[0, 1] * v_R[0] + R_RB[1, 1] * v_R[1] + R_RB[2, 1] * v_R[2],
+        R_RB[0, 2] * v_R[0] + R_RB[1, 2] * v_R[1] + R_RB[2, 2] * v_R[2],
+    )
+    for j in range(3):
+        out[0, j] = out[1, j] = 0.0
     for i in range(p_B.shape[0]):
-        if height[i] >= 0.0:
+        h = height[i]
+        if h >= 0.0:
             bristle[i, 0] = bristle[i, 1] = 0.0
             continue
-        arm = p_B[i] - height[i] * n_B
-        v = v_B + np.cross(w_B, arm)
-        closing = -(v @ n_B)
-        normal = -values[i, K] * height[i] + closing * (values[i, C] if closing > 0.0 else values[i, C_REBOUND])
+        arm = (p_B[i, 0] - h * n[0], p_B[i, 1] - h * n[1], p_B[i, 2] - h * n[2])
+        swept = _cross(turn, arm)
+        moving = (v[0] + swept[0], v[1] + swept[1], v[2] + swept[2])
+        closing = -_dot(moving, n)
+        normal = -values[i, K] * h + closing * (values[i, C] if closing > 0.0 else values[i, C_REBOUND])
         if normal <= 0.0:
             continue
-        v_along, v_across = v @ along, v @ across
+        v_along, v_across = _dot(moving, along), _dot(moving, across)
         brake = brake_left if values[i, BRAKE] == LEFT else brake_right if values[i, BRAKE] == RIGHT else 0.0
         mu, rolling = values[i, MU], values[i, MU_ROLL]
         k = TANGENTIAL_STIFFNESS * values[i, K]
@@ -142,6 +163,12 @@ def reactions(
             b = min(max(b, -limit / k), limit / k)
         bristle[i, 1] = b
 
-        force = normal * n_B + f_along * along + f_across * across
-        out[:3] += force
-        out[3:] += np.cross(arm, force)
+        force = (
+            normal * n[0] + f_along * along[0] + f_across * across[0],
+            normal * n[1] + f_along * along[1] + f_across * across[1],
+            normal * n[2] + f_along * along[2] + f_across * across[2],
+        )
+        moment = _cross(arm, force)
+        for j in range(3):
+            out[0, j] += force[j]
+            out[1, j] += moment[j]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from landing_sim.jit import kernel
-from landing_sim.types import Array
 
 
 class PanTilt:
@@ -76,14 +76,14 @@ class PanTilt:
         self.tilt = self.tilt_cmd = float(tilt)
         self.pan_rate = self.tilt_rate = 0.0  # [rad/s] relative to the body
 
-    def step(self, pan_cmd: float, tilt_cmd: float, w_RB_B: Array, dt: float) -> None:
-        """Advance dt [s] towards the commanded angles [rad] while the body turns at w_RB_B (3,) [rad/s].
+    def step(self, pan_cmd: float, tilt_cmd: float, w_RB_B: Sequence[float], dt: float) -> None:
+        """Advance dt [s] towards the commanded angles [rad] while the body turns at w_RB_B: p, q, r [rad/s].
 
         Commands beyond the limits are held at the limit by the mount, as is the mount itself.
         """
         self.pan_cmd, self.tilt_cmd = pan_cmd, tilt_cmd
         self.pan, self.tilt, self.pan_rate, self.tilt_rate = _advance(
-            self.pan, self.tilt, pan_cmd, tilt_cmd, w_RB_B, dt,
+            self.pan, self.tilt, pan_cmd, tilt_cmd, *w_RB_B, dt,
             self._lag, self._rate_limit, self._stabilisation, self.pan_limit, self.tilt_limit,
         )  # fmt: skip
 
@@ -102,13 +102,13 @@ class Strapdown:
     def reset(self, pan: float, tilt: float) -> None:
         """Nothing moves."""
 
-    def step(self, pan_cmd: float, tilt_cmd: float, w_RB_B: Array, dt: float) -> None:
+    def step(self, pan_cmd: float, tilt_cmd: float, w_RB_B: Sequence[float], dt: float) -> None:
         """Nothing moves."""
 
 
 @kernel
 def _advance(
-    pan: float, tilt: float, pan_cmd: float, tilt_cmd: float, w: Array, dt: float,
+    pan: float, tilt: float, pan_cmd: float, tilt_cmd: float, p: float, q: float, r: float, dt: float,
     lag: float, most: float, k: float, pan_limit: float, tilt_limit: float,
 ) -> tuple[float, float, float, float]:  # fmt: skip
     # Exact for a command constant over dt, so that the lag does not depend on the step.
@@ -116,8 +116,8 @@ def _advance(
     ca, sa = math.cos(pan), math.sin(pan)
     wanted_pan = min(max(pan_cmd, -pan_limit), pan_limit)
     wanted_tilt = min(max(tilt_cmd, -tilt_limit), tilt_limit)
-    pan_rate = (wanted_pan - pan) * follow - k * (w[2] + math.tan(tilt) * (w[0] * ca + w[1] * sa))
-    tilt_rate = (wanted_tilt - tilt) * follow - k * (w[1] * ca - w[0] * sa)
+    pan_rate = (wanted_pan - pan) * follow - k * (r + math.tan(tilt) * (p * ca + q * sa))
+    tilt_rate = (wanted_tilt - tilt) * follow - k * (q * ca - p * sa)
     new_pan = min(max(pan + min(max(pan_rate, -most), most) * dt, -pan_limit), pan_limit)
     new_tilt = min(max(tilt + min(max(tilt_rate, -most), most) * dt, -tilt_limit), tilt_limit)
     return new_pan, new_tilt, (new_pan - pan) / dt, (new_tilt - tilt) / dt

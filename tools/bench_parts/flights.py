@@ -177,7 +177,7 @@ def tape(scenario: Scenario, vehicle: Vehicle) -> Tape:
 def state(plant: JsbsimPlant) -> tuple[float, ...]:
     """Where JSBSim says it is."""
     m = plant._model
-    return tuple(read() for read in (*m.ecef, *m.euler, *m.uvw_fps, *m.pqr))
+    return tuple(read() for read in (*m.ecef_ft, *m.euler, *m.uvw_fps, *m.pqr))
 
 
 def _inputs(plant: JsbsimPlant) -> list[Callable[[float], Any]]:
