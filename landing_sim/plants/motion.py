@@ -37,7 +37,8 @@ def settle(
     """Fill `body` (ROWS, 3) from JSBSim's own figures, and work out what the ground does to its wheels.
 
     x y z : [ft] of the actual cg, Earth-centred; lat, lon [rad] geodetic; altitude [ft] above the ellipsoid
-    phi theta psi : [rad] from local north-east-down; u v w [ft/s] over the ground, p q r [rad/s], body axes; airspeed [ft/s]
+    phi theta psi : [rad] from local north-east-down
+    u v w : [ft/s] over the ground, p q r [rad/s], body axes; airspeed [ft/s]
     site : (SITE_ROWS, 3); slope, p_B, values, height, bristle : see `wheels`
 
     Returns x, y, H [m] of the actual cg in R, the elevation [ft] of the runway's surface below it, the least height [m]

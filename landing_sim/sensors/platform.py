@@ -82,8 +82,9 @@ class PanTilt:
         Commands beyond the limits are held at the limit by the mount, as is the mount itself.
         """
         self.pan_cmd, self.tilt_cmd = pan_cmd, tilt_cmd
+        p, q, r = w_RB_B
         self.pan, self.tilt, self.pan_rate, self.tilt_rate = _advance(
-            self.pan, self.tilt, pan_cmd, tilt_cmd, *w_RB_B, dt,
+            self.pan, self.tilt, pan_cmd, tilt_cmd, p, q, r, dt,
             self._lag, self._rate_limit, self._stabilisation, self.pan_limit, self.tilt_limit,
         )  # fmt: skip
 
