@@ -97,8 +97,12 @@ class Frame(Protocol):
     def window(self, u0: int, v0: int, width: int, height: int) -> np.ndarray:
         """(height, width) uint8 grey levels; columns u0.., rows v0... The window must lie inside the frame."""
 
-    def windows(self, corners: np.ndarray, width: int, height: int) -> np.ndarray:
-        """(n, height, width) uint8 for n corners (n, 2) int64 [u0, v0]: the same pixels, one call."""
+    def windows(self, corners: np.ndarray, width: int, height: int, looked: np.ndarray | None = None) -> np.ndarray:
+        """(n, height, width) uint8 for n corners (n, 2) int64 [u0, v0]: the same pixels, one call.
+
+        looked (n, 4) int64: first column and row of each that are looked at, and those behind the last; other pixels mean
+        nothing then.
+        """
 
     def full(self) -> np.ndarray:
         """(height, width) uint8: the same pixels as the windows."""

@@ -58,7 +58,7 @@ class FlatFrame:
     def window(self, u0: int, v0: int, width: int, height: int) -> np.ndarray:
         return self.full()[v0 : v0 + height, u0 : u0 + width]
 
-    def windows(self, corners: np.ndarray, width: int, height: int) -> np.ndarray:
+    def windows(self, corners: np.ndarray, width: int, height: int, looked: np.ndarray | None = None) -> np.ndarray:
         return np.stack([self.window(int(u), int(v), width, height) for u, v in corners])
 
 

@@ -231,6 +231,9 @@ def test_windows_are_cut_from_the_frame(
     full = frame.full()
     for (u0, v0), window in zip(corners, windows, strict=True):
         assert np.array_equal(window, full[v0 : v0 + 23, u0 : u0 + 31])
+    looked = np.array([[0, 0, 31, 23], [30, 22, 31, 23], [3, 7, 20, 11]])
+    for window, wanted, (u0, v0, u1, v1) in zip(windows, frame.windows(corners, 31, 23, looked), looked, strict=True):
+        assert np.array_equal(window[v0:v1, u0:u1], wanted[v0:v1, u0:u1])
     assert np.array_equal(frame.window(0, 0, 150, 100), full)
     assert np.array_equal(frame.window(*corner, 1, 1)[0, 0], full[corner[1], corner[0]])
 

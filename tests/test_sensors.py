@@ -205,7 +205,7 @@ class Flat:
     def window(self, u0: int, v0: int, width: int, height: int) -> np.ndarray:
         return np.full((height, width), self.grey, np.uint8)
 
-    def windows(self, corners: np.ndarray, width: int, height: int) -> np.ndarray:
+    def windows(self, corners: np.ndarray, width: int, height: int, looked: np.ndarray | None = None) -> np.ndarray:
         return np.full((len(corners), height, width), self.grey, np.uint8)
 
     def full(self) -> np.ndarray:

@@ -16,6 +16,7 @@ from landing_sim.vision import layout as col
 from landing_sim.vision.believed import BelievedCamera, RunwayMap, TaxiwayMouth, ThresholdStripes
 from landing_sim.vision.front_end import FrontEndConfig, RunwayFrontEnd
 from landing_sim.vision.masks import measure, pulled
+from landing_sim.vision.placement import to_look_at
 from landing_sim.vision.prediction import camera_pose, jacobian
 from landing_sim.vision.threshold import clean_strips
 from landing_sim.vision.windows import Scheme, SearchConfig, WindowPlanner
@@ -129,6 +130,30 @@ def test_nothing_the_wrong_way_round_and_two_at_once_are_told_apart() -> None:
 
 
 # --------------------------------------------------------------------- renderer and extractor, against geometry
+
+
+def test_only_what_is_looked_at_matters() -> None:
+    """Pixels outside the part of a window that is asked for may hold anything, and most windows do not need all."""
+    spared = 0
+    for k, pose in enumerate(
+        pose_of((x, 2.0, 51.0 - 0.05 * (x + 900.0), 2.0, 3.0, 0.5)) for x in (-900.0, -500.0, -120.0)
+    ):
+        bench = Bench()
+        pan, tilt = fixate(pose)
+        planner = WindowPlanner(bench.known, bench.camera)
+        w = planner.place(sight(pose, pan, tilt), COV, COUNTS)
+        frame = bench.sample(bench.renderer(), pose, pan, tilt, k).frame
+        look, corners, looked = to_look_at(w.I)
+        images = frame.windows(corners, w.width, w.height)
+        rubbish = np.random.default_rng(k).integers(0, 256, images.shape).astype(np.uint8)
+        for image, noise, (u0, v0, u1, v1) in zip(images, rubbish, looked, strict=True):
+            noise[v0:v1, u0:u1] = image[v0:v1, u0:u1]
+            spared += image.size - (u1 - u0) * (v1 - v0)
+        rule = (planner._polarity, planner._noise)
+        for a, b in zip(measure(images, look, w.F, w.I, *rule), measure(rubbish, look, w.F, w.I, *rule), strict=True):
+            np.testing.assert_array_equal(a, b)
+        assert np.any(planner.measure(frame, w)[3] == FOUND)
+    assert spared > 3000
 
 
 def normal_errors(bench: Bench, pose: np.ndarray, believed: np.ndarray, index: int = 0) -> tuple[np.ndarray, ...]:

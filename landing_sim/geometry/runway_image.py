@@ -17,6 +17,8 @@ import numpy as np
 from landing_sim.jit import kernel
 from landing_sim.types import Array
 
+Vector = tuple[float, float, float]
+
 EARTH_RADIUS = 6.371e6  # [m] mean; the horizon dips by acos(R / (R + h))
 
 LEFT, RIGHT, THRESHOLD, HORIZON = 0, 1, 2, 3  # values of signals.Feature
@@ -37,37 +39,43 @@ def plane_normal(feature: int, p_RC: Array, width: float, slope: float, azimuth:
     the plane touches the dip cone.
     """
     n = np.empty(3)
+    n[0], n[1], n[2] = plane(feature, p_RC, width, slope, azimuth)
+    return n
+
+
+@kernel
+def plane(feature: int, p_RC: Array, width: float, slope: float, azimuth: float) -> Vector:
+    """`plane_normal` as three floats: hundreds are wanted a frame, and an array each would cost as much as the rest."""
     if feature == HORIZON:
         dip = horizon_dip(-p_RC[2])
-        n[0] = -math.sin(dip) * math.cos(azimuth)
-        n[1] = -math.sin(dip) * math.sin(azimuth)
-        n[2] = math.cos(dip)
-        return n
+        return -math.sin(dip) * math.cos(azimuth), -math.sin(dip) * math.sin(azimuth), math.cos(dip)
     a, c = -p_RC[0], -p_RC[2]
     if feature == THRESHOLD:
-        n[0], n[1], n[2] = -c, 0.0, a
-        return n
+        return -c, 0.0, a
     b = (-0.5 if feature == LEFT else 0.5) * width - p_RC[1]
     dx, dz = math.cos(slope), -math.sin(slope)
-    n[0], n[1], n[2] = b * dz, c * dx - a * dz, -b * dx
-    return n
+    return b * dz, c * dx - a * dz, -b * dx
 
 
 @kernel
 def image_line(n_R: Array, R_CR: Array, f: float, cx: float, cy: float) -> Array:
     """l (3,) = K^-T R_CR n: image of the plane with normal n through the camera centre. f, cx, cy [px]."""
-    a = R_CR[0, 0] * n_R[0] + R_CR[0, 1] * n_R[1] + R_CR[0, 2] * n_R[2]
-    b = R_CR[1, 0] * n_R[0] + R_CR[1, 1] * n_R[1] + R_CR[1, 2] * n_R[2]
-    c = R_CR[2, 0] * n_R[0] + R_CR[2, 1] * n_R[1] + R_CR[2, 2] * n_R[2]
     l = np.empty(3)
-    l[0] = a / f
-    l[1] = b / f
-    l[2] = c - (a * cx + b * cy) / f
+    l[0], l[1], l[2] = line_of((n_R[0], n_R[1], n_R[2]), R_CR, f, cx, cy)
     return l
 
 
 @kernel
-def displacement(l: Array, cu: float, cv: float, su: float, sv: float) -> float:
+def line_of(n_R: Vector, R_CR: Array, f: float, cx: float, cy: float) -> Vector:
+    """`image_line` as three floats."""
+    a = R_CR[0, 0] * n_R[0] + R_CR[0, 1] * n_R[1] + R_CR[0, 2] * n_R[2]
+    b = R_CR[1, 0] * n_R[0] + R_CR[1, 1] * n_R[1] + R_CR[1, 2] * n_R[2]
+    c = R_CR[2, 0] * n_R[0] + R_CR[2, 1] * n_R[1] + R_CR[2, 2] * n_R[2]
+    return a / f, b / f, c - (a * cx + b * cy) / f
+
+
+@kernel
+def displacement(l: Array | Vector, cu: float, cv: float, su: float, sv: float) -> float:
     """Signed distance [px] from (cu, cv) to the line l along the unit vector (su, sv); inf if parallel."""
     den = l[0] * su + l[1] * sv
     if den == 0.0:

@@ -109,8 +109,8 @@ class TimedFrame:
     def window(self, u0: int, v0: int, width: int, height: int) -> np.ndarray:
         return self._drawn(lambda: self._frame.window(u0, v0, width, height))
 
-    def windows(self, corners: np.ndarray, width: int, height: int) -> np.ndarray:
-        return self._drawn(lambda: self._frame.windows(corners, width, height))
+    def windows(self, corners: np.ndarray, width: int, height: int, looked: np.ndarray | None = None) -> np.ndarray:
+        return self._drawn(lambda: self._frame.windows(corners, width, height, looked))
 
     def full(self) -> np.ndarray:
         return self._drawn(self._frame.full)

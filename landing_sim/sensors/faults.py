@@ -237,7 +237,7 @@ class RandomFrame:
         v = np.arange(v0, v0 + height, dtype=np.uint64)
         return _mix(self._offset + v[:, None] * np.uint64(self.width) + u)
 
-    def windows(self, corners: np.ndarray, width: int, height: int) -> np.ndarray:
+    def windows(self, corners: np.ndarray, width: int, height: int, looked: np.ndarray | None = None) -> np.ndarray:
         out = np.empty((len(corners), height, width), np.uint8)
         for i, (u0, v0) in enumerate(corners):
             out[i] = self.window(int(u0), int(v0), width, height)

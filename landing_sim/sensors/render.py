@@ -128,12 +128,15 @@ class RenderedFrame:
         """(height, width) uint8; raises ValueError if the window leaves the frame."""
         return self.windows(np.array([[u0, v0]], dtype=np.int64), width, height)[0]
 
-    def windows(self, corners: np.ndarray, width: int, height: int) -> np.ndarray:
-        """(n, height, width) uint8 for n corners (n, 2) int64 [u0, v0]; ValueError if one leaves the frame."""
+    def windows(self, corners: np.ndarray, width: int, height: int, looked: np.ndarray | None = None) -> np.ndarray:
+        """(n, height, width) uint8 for n corners (n, 2) int64 [u0, v0]; ValueError if one leaves the frame.
+
+        looked (n, 4): see signals.Frame; only these pixels are made.
+        """
         n = len(corners)
         if self.renderer.optics.renderer == "exact":
             flat = np.empty((n * height, width), np.uint8)
-            inside = self._shade(flat, corners, width, height, NOTHING)
+            inside = self._shade(flat, corners, width, height, NOTHING, looked)
             out = flat.reshape(n, height, width)
         else:
             image = np.lib.stride_tricks.sliding_window_view(self.full(), (height, width))
@@ -173,16 +176,26 @@ class RenderedFrame:
         )
         if exact:
             out = np.empty_like(image)
-            self._shade(out, r.tiles, TILE, TILE, image)
+            self._shade(out, r.tiles, TILE, TILE, image, None)
             return out
         blurred = render_cv2.blur(image, r.optics.blur)
         return develop_frame(blurred, r.lens, r.quantiles, r.key, self.index)  # type: ignore[no-any-return]
 
-    def _shade(self, out: np.ndarray, corners: np.ndarray, width: int, height: int, filled: np.ndarray) -> bool:
+    def _shade(
+        self,
+        out: np.ndarray,
+        corners: np.ndarray,
+        width: int,
+        height: int,
+        filled: np.ndarray,
+        looked: np.ndarray | None,
+    ) -> bool:
         r = self.renderer
         scene = self._project()
+        if looked is None:
+            looked = np.empty((0, 4), dtype=np.int64)
         return shade(  # type: ignore[no-any-return]
-            out, corners, width, height, filled, *scene, r.camera, r.palette, r.lens, r.table, r.quantiles, r.key,
+            out, corners, width, height, looked, filled, *scene, r.camera, r.palette, r.lens, r.table, r.quantiles, r.key,
             self.index,
         )  # fmt: skip
 

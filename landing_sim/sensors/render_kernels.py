@@ -295,13 +295,14 @@ def _draw_quad(
 
 @kernel
 def shade(
-    out: np.ndarray, corners: np.ndarray, w: int, h: int, filled: np.ndarray,
+    out: np.ndarray, corners: np.ndarray, w: int, h: int, looked: np.ndarray, filled: np.ndarray,
     lines: Array, seen: np.ndarray, counts: np.ndarray, horizon: Array, camera: Array, palette: Array, lens: Array,
     table: Array, quantiles: np.ndarray, key: np.uint64, index: int,
 ) -> bool:  # fmt: skip
     """Blocks of w x h pixels with their top-left pixels at corners (n, 2) [u0, v0], as uint8.
 
     filled empty: `out` (n h, w) takes the blocks one below the other; False, and nothing done, if one leaves the frame.
+    looked (n, 4), if not empty: first and behind the last column and row of each block that are made, and no others.
     filled (height, width) uint8, materials painted beforehand: `out` is the frame, each block goes to its place (less
     what sticks out of the frame), and blocks without an edge are made of what is painted there.
 
@@ -323,6 +324,9 @@ def shade(
         u0, v0 = corners[i, 0], corners[i, 1]
         r0, c0 = (i * h, 0) if stacked else (v0, u0)
         bw, bh = min(w, width - u0), min(h, height - v0)
+        if len(looked) > 0:
+            bw, bh = looked[i, 2] - looked[i, 0], looked[i, 3] - looked[i, 1]
+            u0, c0, v0, r0 = u0 + looked[i, 0], c0 + looked[i, 0], v0 + looked[i, 1], r0 + looked[i, 1]
         flat = not stacked
         for k in range(subs):
             base[k], first[k] = _classify(
@@ -337,7 +341,9 @@ def shade(
             elif base[k] < 0:
                 _draw_horizon(block, bw, bh, u0, v0, horizon[k], camera, palette, table)
             else:
-                block[:] = palette[base[k]]
+                for r in range(bh):
+                    for c in range(bw):
+                        block[r, c] = palette[base[k]]
             for j in range(first[k], counts[k]):
                 m = active[k, j]
                 grey = palette[seen[k, m, 0]]

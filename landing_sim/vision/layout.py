@@ -1,6 +1,6 @@
 """What a window is made of: its columns, the rules for placing it, and how it lies on its line.
 
-A window is a row of two arrays: floats F (n, 12) and integers I (n, 7). Its search path goes by whole pixels of the axis
+A window is a row of two arrays: floats F (n, 12) and integers I (n, 11). Its search path goes by whole pixels of the axis
 nearer to its normal, its mask by whole pixels of the other.
 """
 
@@ -16,7 +16,8 @@ from landing_sim.vision.prediction import NEAR, View
 
 # columns of F; the first five take two
 CENTRE, DIRECTION, STEP, ALONG, ORIGIN, NORMAL_STEP, OFFSET = 0, 2, 4, 6, 8, 10, 11
-FEATURE, STATUS, HALF, SEARCH, CORNER, ARM = 0, 1, 2, 3, 4, 6  # columns of I; CORNER takes two
+# columns of I; CORNER takes two, LOOKED four: of the window's pixels, columns and rows lo, and hi, that are looked at
+FEATURE, STATUS, HALF, SEARCH, CORNER, ARM, LOOKED = 0, 1, 2, 3, 4, 6, 7
 MASK, SIGMAS, SEARCH_MIN, SEARCH_MAX, EXTRA_SIGMA, SEPARATION, BLUR = 0, 1, 2, 3, 4, 5, 6  # fields of the rule
 # fields of the runway, [m] if UNIT is 0, in widths of it if 1 (unknown): length; |y| of the outermost and of the innermost
 # side of the stripes; where they begin, how long they are, and their mean contrast over the surface's; how far behind the

@@ -56,21 +56,16 @@ def _response(delta: float, blur: float, arm: int) -> float:
 
 
 @kernel
-def _curvature(delta: float, blur: float, arm: int) -> float:
-    """D = 2 R(0) - R(1) - R(-1) for an ideal edge of unit contrast and Gaussian `blur` at `delta`."""
-    p = 0.0
-    for k, c in ((1, 1.0), (arm, 1.0), (arm + 1, -1.0)):
-        p += c * (_phi((k - delta) / blur) - _phi((-k - delta) / blur))
-    return p
-
-
-@kernel
-def _parabola(delta: float, blur: float, arm: int) -> float:
-    """What the three-point parabola makes of an ideal edge at `delta`."""
-    n = -2.0 * _phi(-delta / blur)
-    for k, c in ((1, -1.0), (arm, 1.0), (arm + 1, 1.0)):
-        n += c * (_phi((k - delta) / blur) + _phi((-k - delta) / blur))
-    return 0.5 * n / _curvature(delta, blur, arm)
+def _parabola(delta: float, blur: float, arm: int) -> tuple[float, float]:
+    """What the three-point parabola makes of an ideal edge of unit contrast and Gaussian `blur` at `delta`, and its
+    curvature D = 2 R(0) - R(1) - R(-1)."""
+    N, D = -2.0 * _phi(-delta / blur), 0.0
+    for i in range(3):
+        k = 1 if i == 0 else arm if i == 1 else arm + 1
+        up, down = _phi((k - delta) / blur), _phi((-k - delta) / blur)
+        N += (-1.0 if i == 0 else 1.0) * (up + down)
+        D += (1.0 if i < 2 else -1.0) * (up - down)
+    return 0.5 * N / D, D
 
 
 @kernel
@@ -98,8 +93,8 @@ def _edge_at(raw: float, blur: float, arm: int) -> tuple[float, float]:
     """Where an ideal edge is of which the parabola makes `raw`, and the parabola's gain there."""
     d, gain = raw, 1.0
     for _ in range(2):
-        gain = (_parabola(d + 0.05, blur, arm) - _parabola(d - 0.05, blur, arm)) / 0.1
-        d = min(0.6, max(-0.6, d + (raw - _parabola(d, blur, arm)) / gain))
+        gain = (_parabola(d + 0.05, blur, arm)[0] - _parabola(d - 0.05, blur, arm)[0]) / 0.1
+        d = min(0.6, max(-0.6, d + (raw - _parabola(d, blur, arm)[0]) / gain))
     return d, gain
 
 
@@ -216,7 +211,7 @@ def measure(
         size = math.hypot(su, sv)
         z[i] = (best - reach + d) * size + F[i, OFFSET]
         contrast[i] = R[best] / _response(d, b, arm)
-        D = contrast[i] * _curvature(d, b, arm) * gain
+        D = contrast[i] * _parabola(d, b, arm)[1] * gain
         var_N, var_D = 10.0 - 8.0 * across, 6.0 - 16.0 * across
         if arm == 1:
             var_N, var_D = 6.0 - 12.0 * across, 10.0 - 28.0 * across

@@ -25,6 +25,7 @@ from landing_sim.vision.layout import (
     FEATURE,
     HALF,
     LENGTH,
+    LOOKED,
     MASK,
     OFFSET,
     OK,
@@ -79,11 +80,10 @@ def _place_horizon(F: Array, I: np.ndarray, at: int, n: int, view: View, sigma: 
             q[1] -= below * sky[1]
             if min(dot(view.lines[LEFT], q), dot(view.lines[RIGHT], q)) > -(half + 1.0):
                 continue
-            l = sky
+            l = sky.copy()
             for _ in range(4):  # the horizon's line turns with the azimuth it is looked at
-                l = oriented(
-                    feature_line(HORIZON, view.p_RC, view.R_CR, view.lens, view.width, view.slope, u, v), view.up
-                )
+                line = feature_line(HORIZON, view.p_RC, view.R_CR, view.lens, view.width, view.slope, u, v)
+                oriented(line, view.up, l)
                 u, v = on_line(l, u, v)
             su, sv, au, av, advance = path(l, 0.0, 0.0)
             put(F, I, i, u, v, su, sv, au, av, advance, half, search, 3)
@@ -103,7 +103,7 @@ def place(
     counts: np.ndarray,
     rule: Array,
 ) -> tuple[Array, np.ndarray, int, int]:
-    """F (n, 12), I (n, 7) and the width and height [px] of all windows.
+    """F (n, 12), I (n, 11) and the width and height [px] of all windows.
 
     sight (9,), cov (9, 9): see `prediction`; lens: f, cx, cy; frame: width, height; runway, paint, mouths as RunwayMap
     gives them; counts (4,) windows by Feature; rule: see the columns.
@@ -116,7 +116,7 @@ def place(
     view = look(sight, lever, lens, frame, runway[LENGTH], runway[SLOPE])
     sigma = spread(view, sight, cov, lever, rule[EXTRA_SIGMA])
     most = counts[0] + counts[1] + 2 * counts[2] + counts[3]
-    F, I = np.zeros((most, 12)), np.zeros((most, 7), dtype=np.int64)
+    F, I = np.zeros((most, 12)), np.zeros((most, 11), dtype=np.int64)
     F[:, :DIRECTION] = np.nan
     n_T = counts[THRESHOLD]
     seen = place_threshold(F, I, 0, n_T, view, sigma[THRESHOLD], rule, runway)
@@ -127,14 +127,13 @@ def place(
     n = n_T + n_L + n_R + counts[HORIZON]
     F, I = F[:n], I[:n]
 
-    size = np.zeros(2, dtype=np.int64)
+    size, own = np.zeros(2, dtype=np.int64), np.zeros((n, 2), dtype=np.int64)
     for i in range(n):
         if I[i, STATUS] == OK:
             for c in range(2):
                 reach = (I[i, SEARCH] + REACH) * abs(F[i, STEP + c]) + I[i, HALF] * abs(F[i, ALONG + c])
-                size[c] = max(size[c], 2 * math.ceil(reach) + 4)
-    for c in range(2):
-        size[c] = min(size[c], int(frame[c]))
+                own[i, c] = min(2 * math.ceil(reach) + 4, int(frame[c]))
+                size[c] = max(size[c], own[i, c])
     for i in range(n):
         if I[i, STATUS] == OK:
             c = 1 if F[i, ALONG] == 1.0 and abs(F[i, STEP + 1]) == 1.0 else 0
@@ -142,6 +141,26 @@ def place(
             F[i, OFFSET] += shift * math.hypot(F[i, STEP], F[i, STEP + 1])
             for k in range(2):
                 F[i, ORIGIN + k] = F[i, CENTRE + k] + shift * F[i, STEP + k]
-                low = math.floor(F[i, ORIGIN + k]) - size[k] // 2 + 1
-                I[i, CORNER + k] = min(int(frame[k]) - size[k], max(0, low))
+                middle = math.floor(F[i, ORIGIN + k]) + 1
+                corner = min(int(frame[k]) - size[k], max(0, middle - size[k] // 2))
+                I[i, CORNER + k] = corner
+                I[i, LOOKED + k] = max(0, middle - own[i, k] // 2 - corner)
+                I[i, LOOKED + 2 + k] = min(size[k], middle - own[i, k] // 2 + own[i, k] - corner)
     return F, I, size[0], size[1]
+
+
+@kernel
+def to_look_at(I: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows (m,) of the windows to look at, the top-left pixels (m, 2) of their images, what is wanted of these (m, 4)."""
+    rows, corners = np.empty(len(I), dtype=np.int64), np.empty((len(I), 2), dtype=np.int64)
+    looked = np.empty((len(I), 4), dtype=np.int64)
+    m = 0
+    for i in range(len(I)):
+        if I[i, STATUS] == OK:
+            rows[m] = i
+            for k in range(2):
+                corners[m, k] = I[i, CORNER + k]
+            for k in range(4):
+                looked[m, k] = I[i, LOOKED + k]
+            m += 1
+    return rows[:m], corners[:m], looked[:m]

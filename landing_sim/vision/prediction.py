@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from landing_sim.geometry.runway_image import HORIZON, LEFT, RIGHT, THRESHOLD, displacement, image_line, plane_normal
+from landing_sim.geometry.runway_image import HORIZON, LEFT, RIGHT, THRESHOLD, Vector, displacement, line_of, plane
 from landing_sim.geometry.so3 import camera_from_body, from_euler
 from landing_sim.jit import kernel
 from landing_sim.types import Array
@@ -60,14 +60,13 @@ def camera_pose(sight: Array, lever: Array) -> tuple[Array, Array]:
 @kernel
 def feature_line(
     feature: int, p_RC: Array, R_CR: Array, lens: Array, width: float, slope: float, u: float, v: float
-) -> Array:
-    """l (3,) of the feature; the horizon's where the ray of pixel (u, v) looks."""
+) -> Vector:
+    """l of the feature; the horizon's where the ray of pixel (u, v) looks."""
     azimuth = 0.0
     if feature == HORIZON:
         a, b = (u - lens[1]) / lens[0], (v - lens[2]) / lens[0]
         azimuth = math.atan2(a * R_CR[0, 1] + b * R_CR[1, 1] + R_CR[2, 1], a * R_CR[0, 0] + b * R_CR[1, 0] + R_CR[2, 0])
-    n = plane_normal(feature, p_RC, width, slope, azimuth)
-    return image_line(n, R_CR, lens[0], lens[1], lens[2])
+    return line_of(plane(feature, p_RC, width, slope, azimuth), R_CR, lens[0], lens[1], lens[2])
 
 
 @kernel
@@ -76,10 +75,11 @@ def dot(l: Array, q: Array) -> float:
 
 
 @kernel
-def oriented(l: Array, q: Array) -> Array:
-    """l scaled to a unit normal, positive on the side of the homogeneous point or direction q."""
+def oriented(l: Vector, q: Array, out: Array) -> None:
+    """`out` (3,) = l scaled to a unit normal, positive on the side of the homogeneous point or direction q."""
     norm = max(math.hypot(l[0], l[1]), 1e-12 * abs(l[2]), 1e-300)  # no direction: seen from its own plane, end on
-    return l * ((1.0 if dot(l, q) >= 0.0 else -1.0) / norm)
+    scale = (1.0 if l[0] * q[0] + l[1] * q[1] + l[2] * q[2] >= 0.0 else -1.0) / norm
+    out[0], out[1], out[2] = l[0] * scale, l[1] * scale, l[2] * scale
 
 
 @kernel
@@ -115,10 +115,8 @@ def look(sight: Array, lever: Array, lens: Array, frame: Array, length: float, s
     up = _image_of(0.0, 0.0, -1.0, R, lens)
     u, v = (along[0] / along[2], along[1] / along[2]) if along[2] > 0.0 else (lens[1], lens[2])
     lines = np.empty((4, 3))
-    lines[LEFT] = oriented(feature_line(LEFT, p, R, lens, width, slope, u, v), across)
-    lines[RIGHT] = oriented(feature_line(RIGHT, p, R, lens, width, slope, u, v), -across)
-    lines[THRESHOLD] = oriented(feature_line(THRESHOLD, p, R, lens, width, slope, u, v), along)
-    lines[HORIZON] = oriented(feature_line(HORIZON, p, R, lens, width, slope, u, v), up)
+    for feature, side in enumerate((across, -across, along, up)):
+        oriented(feature_line(feature, p, R, lens, width, slope, u, v), side, lines[feature])
     ground = _inverse(along, across, threshold)
     return View(p, R, lens, frame, width, length, slope, along, across, threshold, up, ground, lines)
 

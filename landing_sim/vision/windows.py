@@ -14,15 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from landing_sim.signals import Frame, Status
+from landing_sim.signals import Frame
 from landing_sim.types import Array
 from landing_sim.vision import layout as col
 from landing_sim.vision.believed import BelievedCamera, RunwayMap
 from landing_sim.vision.masks import measure
-from landing_sim.vision.placement import place
+from landing_sim.vision.placement import place, to_look_at
 from landing_sim.vision.prediction import jacobian
-
-_FOUND = int(Status.FOUND)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +91,7 @@ class EdgeConfig:
 
 @dataclass(frozen=True, slots=True)
 class Windows:
-    """Windows as placed: rows of F (n, 12) and I (n, 7), see `layout`, all of size width x height [px]."""
+    """Windows as placed: rows of F (n, 12) and I (n, 11), see `layout`, all of size width x height [px]."""
 
     F: Array
     I: np.ndarray
@@ -186,6 +184,6 @@ class WindowPlanner:
 
         NaN where not found. Windows whose status is not FOUND are not looked at.
         """
-        look = np.flatnonzero(windows.I[:, col.STATUS] == _FOUND)
-        images = frame.windows(windows.I[look, col.CORNER : col.CORNER + 2], windows.width, windows.height)
+        look, corners, looked = to_look_at(windows.I)
+        images = frame.windows(corners, windows.width, windows.height, looked)
         return measure(images, look, windows.F, windows.I, self._polarity, self._noise)  # type: ignore[no-any-return]
