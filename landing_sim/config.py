@@ -58,7 +58,7 @@ def assign(document: Document, keys: list[str], value: Any, mark: Mark) -> Probl
         if not rest:
             return value
         key: str | int = rest[0]
-        if isinstance(node, tuple):
+        if isinstance(node, tuple | list):
             if not rest[0].isdecimal() or int(rest[0]) >= len(node):
                 raise LookupError(f"the list has {len(node)} items, counted from 0")
             key = int(rest[0])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import copy
 import hashlib
 import json
+import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -27,6 +28,15 @@ from landing_sim.sections.judged import Metric
 EXTRA_METRICS = ("touchdown_sideslip_deg", "gear_height_60m_m")
 """What a campaign judges beyond `record.judge.measure`."""
 METRICS: tuple[str, ...] = (*get_args(Metric), *EXTRA_METRICS)
+NEES_BANDS: dict[str, tuple[float, float]] = {
+    "nees_beyond_3000m": (-math.inf, -3000.0),
+    "nees_3000_1000m": (-3000.0, -1000.0),
+    "nees_1000_300m": (-1000.0, -300.0),
+    "nees_300_0m": (-300.0, 0.0),
+    "nees_over_runway": (0.0, math.inf),
+}
+"""Figures of the estimate's consistency over a stretch of x [m] each: mean squared error over variance, per state."""
+_TAKEN = {*METRICS, *NEES_BANDS, "run", "outcome", "reason", "wall_s", "cpu_s", "peak_mb", "worker"}
 
 
 class CampaignError(ConfigError):
@@ -73,9 +83,11 @@ class Campaign(Section):
     )
     set: dict[str, Any] = Field({}, description="values of the scenario that are other than in its file, by path")
     variables: dict[Annotated[str, Field(pattern=r"^[A-Za-z]\w*$")], Distribution] = Field(
-        {}, description="drawn values that are none of the scenario's, for others to be derived from"
+        {}, max_length=500, description="drawn values that are none of the scenario's, for others to be derived from"
     )
-    dispersions: dict[str, Distribution] = Field({}, description="values of the scenario that are dispersed, by path")
+    dispersions: dict[str, Distribution] = Field(
+        {}, max_length=500, description="values of the scenario that are dispersed, by path"
+    )
     correlations: tuple[Correlation, ...] = Field((), max_length=100, description="between what is drawn")
     sweep: Sweep | None = Field(None, description="null = everything is dispersed")
     risks: tuple[Risk, ...] = Field((), max_length=100, description="what the verdict is about")
@@ -183,6 +195,13 @@ def _names(campaign: Campaign) -> Iterator[Wrong]:
                         near = did_you_mean(part, above)
                         yield (section, name, "derived", "of"), f"nothing above is called {part!r}{near}"
             above.append(name)
+    for name in campaign.variables:
+        if name.lower() in {taken.lower() for taken in _TAKEN}:
+            yield ("variables", name), "is the name of a column of the results: choose another"
+    paths_met = [*(("set", p) for p in campaign.set), *(("dispersions", p) for p in campaign.dispersions)]
+    for where in paths_met:
+        if where[1].partition(".")[0] in ("seed", "run", "schema_version", "mission"):
+            yield where, "is the campaign's own business"
     for path in campaign.dispersions:
         if path in campaign.set:
             yield ("dispersions", path), "stands under `set` as well"

@@ -1,0 +1,91 @@
+"""Workers of a dask cluster instead of processes of ours: `--cluster ADDRESS`, extra `cluster`.
+
+A landing is given out when a worker is free for it, never in advance: a worker that is lost takes one landing with it,
+which the scheduler gives to another. One that its workers keep dying of is set aside.
+"""
+
+from __future__ import annotations
+
+import itertools
+import traceback
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from landing_sim.campaign.file import CampaignError
+from landing_sim.campaign.machine import software
+from landing_sim.campaign.pool import Done, Job, Value
+from landing_sim.errors import Mark, Problem
+
+TIMEOUT = 30.0  # [s] for the scheduler to answer and for a first worker
+
+
+def run(function: Callable[[Job], Value], jobs: Iterable[Job], address: str) -> Iterator[Done[Job, Value]]:
+    """As `pool.run`, on the workers of the scheduler at `address`.
+
+    Raises CampaignError where there is no scheduler, no worker, or one with other software or several threads.
+    """
+    try:
+        from distributed import Client, KilledWorker, as_completed, get_worker  # noqa: F401
+    except ImportError as error:
+        raise _wrong(address, f"dask is missing ({error}): pip install 'landing-sim[cluster]'") from None
+    try:
+        client = Client(address, timeout=TIMEOUT, set_as_default=False)
+        client.wait_for_workers(1, timeout=TIMEOUT)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise _wrong(address, f"no scheduler with workers there: {error}") from None
+    try:
+        _check(client, address)
+        scattered = client.scatter(function, broadcast=True, hash=False)
+        waiting = iter(jobs)
+        flying: dict[Any, Any] = {}
+
+        def submit(count: int) -> list[Any]:
+            for job in itertools.islice(waiting, count):
+                future = client.submit(_call, scattered, job, pure=False)
+                flying[future.key] = (future, job)
+                futures.add(future)
+            return list(flying)
+
+        futures = as_completed(loop=client.loop)
+        submit(_slots(client))
+        while flying:
+            future = next(futures)
+            _, job = flying.pop(future.key)
+            # workers that have come in the meantime are used, those that have gone are not waited for
+            submit(max(_slots(client) - len(flying), 0 if flying else 1))
+            if future.status == "finished":
+                yield Done(job, *future.result())
+            elif isinstance(future.exception(), KilledWorker):
+                yield Done(job)
+            else:
+                yield Done(job, error="".join(traceback.format_exception(future.exception())))
+    finally:
+        client.close()
+
+
+def _call(function: Callable[[Any], Any], job: Any) -> tuple[Any, str]:
+    try:
+        return function(job), ""
+    except Exception:
+        return None, traceback.format_exc()
+
+
+def _slots(client: Any) -> int:
+    return len(client.scheduler_info(n_workers=-1)["workers"])
+
+
+def _check(client: Any, address: str) -> None:
+    for name, worker in client.scheduler_info(n_workers=-1)["workers"].items():
+        if worker["nthreads"] != 1:
+            raise _wrong(
+                address, f"worker {name} has {worker['nthreads']} threads: start it with --nthreads 1, and more of them"
+            )
+    ours = software()
+    for name, theirs in client.run(software).items():
+        other = [f"{key} {theirs.get(key)}, not {ours[key]}" for key in ours if theirs.get(key) != ours[key]]
+        if other:
+            raise _wrong(address, f"worker {name} has {'; '.join(other)}: its landings would be others")
+
+
+def _wrong(address: str, message: str) -> CampaignError:
+    return CampaignError([Problem(Mark(f"--cluster {address}"), (), message)])
