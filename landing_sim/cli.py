@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from landing_sim.campaign import commands
 from landing_sim.errors import ConfigError, Mark, Problem, did_you_mean
 
 if TYPE_CHECKING:
@@ -26,7 +27,8 @@ PASSED, FAILED, USAGE, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 130
 app = typer.Typer(
     name="landing-sim",
     help="Vision-based landing, pixels in the loop: JSBSim flies, a camera is rendered, the 4D-approach filter estimates.",
-    epilog="Exit codes: 0 passed, 1 flown but criteria not met, 2 usage or bad file, 3 internal error, 130 interrupted.",
+    epilog="Exit codes: 0 passed, 1 flown but criteria not met, 2 usage or bad file, 3 internal error, "
+    "4 partial campaign, 130 interrupted.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -59,11 +61,18 @@ def run(
 
 @app.command()
 def replay(
-    path: Annotated[Path, typer.Argument(help="A folder that `run` wrote, or a recording (.rrd).")],
+    path: Annotated[Path, typer.Argument(help="A folder that `run` or `campaign` wrote, or a recording (.rrd).")],
+    run: Annotated[int | None, typer.Option(min=0, help="Which landing of a campaign.")] = None,
     set_: SetOption = None,
     web: Annotated[bool, typer.Option("--web", help="Show it in a browser instead of a window.")] = False,
 ) -> None:
-    """Open a flight in the viewer; with --set, fly it again with these changes first."""
+    """Open a flight in the viewer; with --set, fly it again with these changes first.
+
+    Landing --run of a campaign is flown again, bit for bit; with --set, the changed one is seen beside it.
+    """
+    if run is not None:
+        commands.replay(path, run, set_ or [], web)
+        return
     from landing_sim.runner import RECORDING, SCENARIO
 
     if set_:
@@ -132,16 +141,21 @@ def design(
 
 @app.command()
 def check(
-    files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Scenarios (files or names) or vehicle.yaml.")],
+    files: Annotated[
+        list[str], typer.Argument(metavar="FILE...", help="Scenarios, campaigns (files or names) or vehicle.yaml.")
+    ],
 ) -> None:
     """Check files without flying: every problem as file:line:column."""
     from landing_sim import paths, scenario, vehicle
+    from landing_sim.campaign import file as campaign_file
 
     problems: list[Problem] = []
     for name in files:
         try:
             if Path(name).name == "vehicle.yaml":
                 vehicle.load_file(Path(name))
+            elif _is_campaign(name):
+                campaign_file.load(name)
             else:
                 model = scenario.load(name).aircraft.model
                 vehicle.load_file(paths.aircraft_folder(model) / "vehicle.yaml")
@@ -154,9 +168,12 @@ def check(
 
 
 @app.command()
-def schema() -> None:
-    """Print the JSON Schema of scenario files, for editors."""
-    from landing_sim.scenario import schema_text
+def schema(campaign: Annotated[bool, typer.Option("--campaign", help="Of campaign files.")] = False) -> None:
+    """Print the JSON Schema of scenario files, or of campaigns, for editors."""
+    if campaign:
+        from landing_sim.campaign.file import schema_text
+    else:
+        from landing_sim.scenario import schema_text
 
     typer.echo(schema_text(), nl=False)
 
@@ -171,13 +188,16 @@ def doctor() -> None:
 
 @app.command(name="list")
 def list_() -> None:
-    """Shipped scenarios, aircraft and papers."""
-    from landing_sim import paths, scenario
+    """Shipped scenarios, campaigns, aircraft and papers."""
+    from landing_sim import paths, scenario, yamlfile
     from landing_sim.papers import PAPERS
 
     typer.echo("scenarios")
     for name in paths.scenario_names():
         typer.echo(f"  {name:22}{scenario.load(name).description}")
+    typer.echo("campaigns")
+    for name in paths.campaign_names():
+        typer.echo(f"  {name:30}{yamlfile.load(paths.campaign_file(name)).data.get('description', '')}")
     typer.echo("aircraft")
     for name in paths.aircraft_names():
         typer.echo(f"  {name}")
@@ -186,10 +206,23 @@ def list_() -> None:
         typer.echo(f"  {name}")
 
 
+app.command()(commands.campaign)
+app.command()(commands.export)
+
+
 def _load(name: str, changes: list[str]) -> Scenario:
     from landing_sim.scenario import load
 
     return load(name, changes)
+
+
+def _is_campaign(name: str) -> bool:
+    """By its name if it is shipped, else by what its file holds: a campaign names a scenario, a scenario a mission."""
+    from landing_sim import paths, yamlfile
+
+    if name in paths.campaign_names():
+        return True
+    return name not in paths.scenario_names() and "scenario" in yamlfile.load(paths.scenario_file(name)).data
 
 
 def _fly(

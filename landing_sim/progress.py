@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import json
+import math
 import shlex
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import timedelta
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from landing_sim.scenario import Scenario
 from landing_sim.signals import Step
+
+if TYPE_CHECKING:
+    from landing_sim.campaign import run as campaign_run
+
+EVERY = 5.0  # [s] between lines of a campaign's progress
 
 LABELS = {
     "range_m": "range error, within 500 m",
@@ -75,6 +83,46 @@ def _lines() -> Callable[[Step], None]:
             print(json.dumps(line), file=sys.stderr, flush=True)
 
     return watch
+
+
+@contextmanager
+def campaign_shown(name: str, runs: int) -> Iterator[Callable[[campaign_run.Progress], None]]:
+    """A watcher of a campaign: a bar on a terminal, else a JSON line every few seconds: rate and time that remains."""
+    started = time.monotonic()
+
+    def figures(now: campaign_run.Progress) -> tuple[float, float]:
+        """[1/s] landings, [s] remaining"""
+        rate = now.here / max(time.monotonic() - started, 1e-3)
+        return rate, (now.runs - now.done) / rate
+
+    if not sys.stderr.isatty():
+        last = -math.inf
+
+        def say(now: campaign_run.Progress) -> None:
+            nonlocal last
+            if now.done < now.runs and time.monotonic() - last < EVERY:
+                return
+            last = time.monotonic()
+            rate, left = figures(now)
+            line = {"landings": now.done, "of": now.runs, "per_s": round(rate, 3), "remaining_s": round(left)}
+            print(json.dumps(line), file=sys.stderr, flush=True)
+
+        yield say
+        return
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[state]}"))
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(escape(name), total=runs, state="starting workers")
+
+        def watch(now: campaign_run.Progress) -> None:
+            rate, left = figures(now)
+            state = f"{rate:.2f}/s, {timedelta(seconds=round(left))} left; run {now.latest.run} {now.latest.outcome}"
+            bar.update(task, completed=now.done, state=state)
+
+        yield watch
 
 
 def table(result: dict[str, Any]) -> None:

@@ -52,6 +52,7 @@ def fly(
     recording: Path | None = None,
     live: bool = False,
     noise: Callable[[str], NoiseStream] | None = None,
+    other: log.FlightLog | None = None,
 ) -> Flight:
     """Fly it to its end.
 
@@ -59,6 +60,7 @@ def fly(
     recording : where to write one for the viewer; None leaves it out
     live : show it in the viewer while it flies; needs a recording
     noise : the stream of a named component, instead of those of the scenario's seed and run
+    other : a flight that the recording shows beside this one
 
     Raises ScenarioError where the aircraft cannot fly what the scenario wants at the start, ReplayError from the recording.
     """
@@ -89,7 +91,7 @@ def fly(
         extra={"reason": outcome.reason} if outcome.reason else None,
     )
     if recorder is not None:
-        recorder.close(flown)
+        recorder.close(flown, other)
     return Flight(flown, judge.judge(flown, limits(scenario)), time.perf_counter() - started)
 
 

@@ -86,6 +86,7 @@ def fly(
     noise: Callable[[str], NoiseStream] | None = None,
     changes: Sequence[str] = (),
     recording: Path | None = None,
+    other: FlightLog | None = None,
 ) -> tuple[Scenario, runner.Flight]:
     """Fly run `run` of a campaign as it is flown there, bit for bit, unless something else is wanted.
 
@@ -93,13 +94,14 @@ def fly(
     noise : where every random number of this landing comes from, dispersions included
     changes : ``path=value``, as given to --set, on top
     recording : where to write one for the viewer
+    other : a flight that the recording shows beside it
 
     Raises ConfigError where the aircraft cannot fly what was drawn or changed.
     """
     if values is None:
         values = draw(plan.campaign, run, noise)
     wanted = scenario_of(plan, run, values, changes)
-    return wanted, runner.fly(wanted, _vehicle(wanted.aircraft.model), noise=noise, recording=recording)
+    return wanted, runner.fly(wanted, _vehicle(wanted.aircraft.model), noise=noise, recording=recording, other=other)
 
 
 def scenario_of(plan: Plan, run: int, values: Mapping[str, Any], changes: Sequence[str] = ()) -> Scenario:

@@ -29,6 +29,7 @@ __all__ = ["Recorder", "ReplayError", "Scene", "events", "open_viewer", "record_
 TIMELINE = "time"
 SIGHT = 30.0  # [m]
 TRUE_COLOUR, ESTIMATE_COLOUR, BAND_COLOUR = (60, 220, 120), (255, 170, 40), (150, 150, 165)
+OTHER_COLOUR = (120, 150, 255)
 IMAGE = "world/camera/image"
 
 
@@ -119,9 +120,16 @@ class Recorder:
         if self._live:
             self._follow(step)
 
-    def close(self, log: FlightLog) -> None:
-        """Everything that does not need pixels, from the log; then the file is complete."""
+    def close(self, log: FlightLog, other: FlightLog | None = None) -> None:
+        """Everything that does not need pixels, from the log; then the file is complete.
+
+        other : another flight to be seen beside this one: its path, its aircraft as a ghost, its series
+        """
         record_log(self._stream, log)
+        if other is not None:
+            body = shapes.aircraft(self._scene.span, self._scene.fuselage)
+            self._stream.log("world/other/body", _mesh(body, OTHER_COLOUR), static=True)
+            record_other(self._stream, other)
         self._stream.flush()
         self._stream.disconnect()
 
@@ -229,6 +237,24 @@ def record_log(stream: rr.RecordingStream, log: FlightLog) -> None:
     for when, text in events(log):
         stream.set_time(TIMELINE, duration=when)
         stream.log("flight/events", rr.TextLog(text, level=rr.TextLogLevel.INFO))
+
+
+def record_other(stream: rr.RecordingStream, log: FlightLog) -> None:
+    """Path, pose and series of a flight that another one is compared with; its series stand beside that one's."""
+    rr = _rerun()
+    times = [rr.TimeColumn(TIMELINE, duration=log["t_s"])]
+    p = np.column_stack([log["true_x_m"], log["true_y_m"], log["true_z_m"]])
+    R_RB = [from_euler(*e) for e in zip(log["true_phi_rad"], log["true_theta_rad"], log["true_psi_rad"])]
+    stream.send_columns("world/other", times, rr.Transform3D.columns(translation=p, mat3x3=np.stack(R_RB)))
+    path = rr.LineStrips3D([p], colors=OTHER_COLOUR, radii=rr.Radius.ui_points(1.5))
+    stream.log("world/path/other", path, static=True)
+    for entity, _, series in SERIES:
+        shown = [(column, name, factor) for column, name, factor in series if column.startswith("true_")]
+        if shown:
+            names = [f"{name}, other" for _, name, _ in shown]
+            stream.log(f"{entity}/other", rr.SeriesLines(names=names), static=True)
+            values = np.column_stack([factor * log[column] for column, _, factor in shown])
+            stream.send_columns(f"{entity}/other", times, rr.Scalars.columns(scalars=values))
 
 
 def _blueprint(scene: Scene) -> Any:
