@@ -2,9 +2,9 @@
 
 Event      the risk's metric above or below its limits. A landing without the metric that ended otherwise than in a
            go-around counts as the event whatever the risk: a crash before touchdown, an aircraft off the runway, a
-           timeout, a numeric error, a draw that no trim exists for, a landing that took its worker down. The numeric
-           error and the killed worker count even where the metric exists. A go-around is no landing: it is neither an event
-           nor counted in n, and is reported.
+           timeout, a numeric error, a draw that no trim exists for. A numeric error, a landing that took its worker down
+           and one that failed for our own fault count even where the metric exists. A go-around is no landing: it is
+           neither an event nor counted in n, and is reported.
 Bounds     the two ends of the two-sided 95 % interval: `upper95` alone holds with 97.5 %, and so does `lower95`.
 Methods    "count": exact (Clopper & Pearson 1934), for independent landings. Zero events pass 1e-6 after 3.7 million.
            "tail": a generalised Pareto tail (`tails`), only where its goodness of fit passes and every landing has the
@@ -29,7 +29,7 @@ from landing_sim.types import Array
 
 PASS, FAIL, OPEN = "PASS", "FAIL", "NOT ENOUGH EVIDENCE"
 Method = Literal["count", "rare-event", "tail"]
-ALWAYS_EVENTS = ("numeric_error", "worker_killed")
+ALWAYS_EVENTS = ("numeric_error", "worker_killed", "error")
 
 
 class Risk(Protocol):
