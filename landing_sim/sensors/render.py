@@ -16,7 +16,7 @@ import numpy as np
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.sensors import render_cv2
 from landing_sim.sensors.render_kernels import TILE, edge_table, project, shade
-from landing_sim.sensors.render_noise import develop_frame, gaussian_quantiles
+from landing_sim.sensors.render_noise import develop_frame, develop_materials, developed, gaussian_quantiles
 from landing_sim.signals import CameraTruth
 from landing_sim.types import Array
 from landing_sim.world.runway import GRASS, SKY, Runway
@@ -176,6 +176,7 @@ class RenderedFrame:
         )
         if exact:
             out = np.empty_like(image)
+            develop_materials(out, image, developed(tuple(r.palette.tolist()), *r.lens.tolist()), r.key, self.index)
             self._shade(out, r.tiles, TILE, TILE, image, None)
             return out
         blurred = render_cv2.blur(image, r.optics.blur)

@@ -303,8 +303,8 @@ def shade(
 
     filled empty: `out` (n h, w) takes the blocks one below the other; False, and nothing done, if one leaves the frame.
     looked (n, 4), if not empty: first and behind the last column and row of each block that are made, and no others.
-    filled (height, width) uint8, materials painted beforehand: `out` is the frame, each block goes to its place (less
-    what sticks out of the frame), and blocks without an edge are made of what is painted there.
+    filled (height, width) uint8, materials painted beforehand: `out` is the frame that `develop_materials` made of them,
+    each block goes to its place (less what sticks out of the frame), and blocks without an edge stay as they are.
 
     A frame is the mean over its sub-exposures (first axis of lines, seen, counts, horizon), then lens and noise.
     """
@@ -333,12 +333,10 @@ def shade(
                 u0, v0, bw, bh, lines[k], seen[k], counts[k], horizon[k], camera, active[k], edges[k]
             )
             flat = flat and base[k] >= 0 and first[k] == counts[k]
+        if flat:
+            continue
         for k in range(subs):
-            if flat:
-                for r in range(bh):
-                    for c in range(bw):
-                        block[r, c] = palette[filled[v0 + r, u0 + c]]
-            elif base[k] < 0:
+            if base[k] < 0:
                 _draw_horizon(block, bw, bh, u0, v0, horizon[k], camera, palette, table)
             else:
                 for r in range(bh):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -18,6 +18,13 @@ def gaussian_quantiles() -> np.ndarray:
     from scipy.special import ndtri
 
     return ndtri((np.arange(QUANTILES) + 0.5) / QUANTILES).astype(np.float32)  # type: ignore[no-any-return]
+
+
+@lru_cache(maxsize=4)
+def developed(palette: tuple[float, ...], gain: float, offset: float, sigma: float) -> np.ndarray:
+    """(n, 65536) uint8: what `develop` makes of each of n greys with each of the quantiles."""
+    value = (np.array(palette) * gain + offset)[:, None] + sigma * gaussian_quantiles().astype(np.float64) + 0.5
+    return np.clip(value, 0.0, 255.0).astype(np.uint8)
 
 
 @kernel
@@ -60,6 +67,20 @@ def develop(
             value = block[r, c] * gain + offset + noise[skip + c] + 0.5
             value = value if value > 0.0 else 0.0
             out[r0 + r, c0 + c] = np.uint8(value if value < 255.0 else 255.0)
+
+
+@kernel
+def develop_materials(out: np.ndarray, materials: np.ndarray, greys: np.ndarray, key: np.uint64, index: int) -> None:
+    """A frame (height, width) uint8 of the materials painted in it, as if there were no edges; greys as `developed`."""
+    height, width = out.shape
+    stream = stream_of(key, index)
+    hashes = np.empty((width + 3) >> 2, np.uint64)
+    bits = hashes.view(np.uint16)  # the lanes of `develop`, on a little-endian machine
+    for r in range(height):
+        for g in range(len(hashes)):
+            hashes[g] = mix(stream + np.uint64((r << 20) + g + 1) * np.uint64(0x9E3779B97F4A7C15))
+        for c in range(width):
+            out[r, c] = greys[materials[r, c], bits[c]]
 
 
 @kernel
