@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +18,7 @@ NEAR = 2.0  # [m] in front of the camera, where edges are cut off
 HALF_EDGE = 7.0  # [px] half the drawn length of a measured edge
 
 Colour = tuple[int, int, int]
+Ends = tuple[tuple[float, float], tuple[float, float]]  # [px]
 FEATURE_COLOURS: dict[Feature, Colour] = {
     Feature.LEFT: (64, 200, 255),
     Feature.RIGHT: (255, 176, 32),
@@ -60,35 +63,43 @@ def predicted_edges(estimate: Estimate, pan: float, tilt: float, camera: Believe
     R_RB = from_euler(estimate["phi"], estimate["theta"], estimate["psi"])
     R_CR = camera_from_body(pan, tilt) @ R_RB.T
     p_RC = np.array([estimate["x"], estimate["y"], -estimate["H"]]) + R_RB @ camera.lever_B
-    half = 0.5 * estimate.get("W", camera.width)
-    far = np.array([camera.length * np.cos(camera.slope), 0.0, -camera.length * np.sin(camera.slope)])
-    left, right = np.array([0.0, -half, 0.0]), np.array([0.0, half, 0.0])
-    ends, features = [], []
-    for feature, a, b in (
-        (Feature.LEFT, left, left + far),
-        (Feature.RIGHT, right, right + far),
-        (Feature.THRESHOLD, left, right),
-    ):
-        cut = _into_image(R_CR @ (a - p_RC), R_CR @ (b - p_RC), camera.intrinsics)
-        if cut is not None:
-            ends.append(cut)
-            features.append(feature)
-    azimuth = float(np.arctan2(R_CR[2, 1], R_CR[2, 0]))
+    half, k = 0.5 * estimate.get("W", camera.width), camera.intrinsics
+    x, z = camera.length * math.cos(camera.slope), -camera.length * math.sin(camera.slope)
+    corners = np.array([[0.0, -half, 0.0], [0.0, half, 0.0], [x, -half, z], [x, half, z]])
+    near_left, near_right, far_left, far_right = ((corners - p_RC) @ R_CR.T).tolist()
+    azimuth = math.atan2(R_CR[2, 1], R_CR[2, 0])
     normal = plane_normal(int(Feature.HORIZON), p_RC, 2.0 * half, camera.slope, azimuth)
-    k = camera.intrinsics
-    horizon = _across_image(image_line(normal, R_CR, k.f, k.cx, k.cy), k)
-    if horizon is not None:
-        ends.append(horizon)
-        features.append(Feature.HORIZON)
-    return Segments(np.array(ends).reshape(-1, 2, 2), np.array(features, np.int64))
+    edges = (
+        (Feature.LEFT, _into_image(near_left, far_left, k)),
+        (Feature.RIGHT, _into_image(near_right, far_right, k)),
+        (Feature.THRESHOLD, _into_image(near_left, near_right, k)),
+        (Feature.HORIZON, _across_image(image_line(normal, R_CR, k.f, k.cx, k.cy).tolist(), k)),
+    )
+    seen = [(feature, ends) for feature, ends in edges if ends is not None]
+    return Segments(
+        np.array([ends for _, ends in seen]).reshape(-1, 2, 2), np.array([feature for feature, _ in seen], np.int64)
+    )
+
+
+def joined(sets: Sequence[EdgeSet]) -> EdgeSet:
+    """The windows of several images as one set; its angles mean nothing."""
+    feature, centre, direction, status = (
+        np.concatenate(column) for column in zip(*((s.feature, s.centre, s.direction, s.status) for s in sets))
+    )
+    return EdgeSet(feature, centre, direction, status, pan=np.nan, tilt=np.nan)
+
+
+def found(edges: EdgeSet, z: Array) -> np.ndarray:
+    """(n,) bool: where an edge was measured, whatever the estimator made of it."""
+    return np.isfinite(z) & ((edges.status == Status.FOUND) | (edges.status == Status.REJECTED))
 
 
 def measured_edges(edges: EdgeSet, z: Array) -> Segments:
     """A short piece of edge, square to the search direction, where each window found one."""
-    found = np.isfinite(z) & np.isin(edges.status, (Status.FOUND, Status.REJECTED))
-    at = edges.centre[found] + z[found, None] * edges.direction[found]
-    along = np.column_stack([-edges.direction[found, 1], edges.direction[found, 0]])
-    return Segments(np.stack([at - HALF_EDGE * along, at + HALF_EDGE * along], axis=1), edges.feature[found])
+    use = found(edges, z)
+    at = edges.centre[use] + z[use, None] * edges.direction[use]
+    along = np.column_stack([-edges.direction[use, 1], edges.direction[use, 0]])
+    return Segments(np.stack([at - HALF_EDGE * along, at + HALF_EDGE * along], axis=1), edges.feature[use])
 
 
 def window_boxes(edges: EdgeSet, half_search: float = 20.0, half_width: float = HALF_EDGE) -> Array:
@@ -101,24 +112,31 @@ def window_boxes(edges: EdgeSet, half_search: float = 20.0, half_width: float = 
     )
 
 
+def packed(colours: Mapping[Feature, Colour] | Mapping[Status, Colour]) -> np.ndarray:
+    """(n,) uint32 0xRRGGBBAA, opaque, to be looked up by Feature or Status."""
+    in_order = (colour for _, colour in sorted(colours.items()))
+    return np.array([int.from_bytes(bytes((*colour, 255)), "big") for colour in in_order], np.uint32)
+
+
 def camera_sample(samples: tuple[Sample, ...]) -> tuple[float, CameraSample] | None:
     """The image among a cycle's samples, if there is one, and when it was exposed [s]."""
     return next(((sample.t_valid, sample.data) for sample in samples if isinstance(sample.data, CameraSample)), None)
 
 
-def _into_image(a: Array, b: Array, k: Intrinsics) -> Array | None:
-    """(2, 2) the visible part of the segment from a to b, both in frame C; None if there is none."""
+def _into_image(a: Sequence[float], b: Sequence[float], k: Intrinsics) -> Ends | None:
+    """The visible part of the segment from a to b, both in frame C; None if there is none."""
     if a[2] < NEAR and b[2] < NEAR:
         return None
     if a[2] < NEAR or b[2] < NEAR:
-        cut = a + (NEAR - a[2]) / (b[2] - a[2]) * (b - a)
+        s = (NEAR - a[2]) / (b[2] - a[2])
+        cut = [p + s * (q - p) for p, q in zip(a, b)]
         a, b = (cut, b) if a[2] < NEAR else (a, cut)
     start, stop = ((k.cx + k.f * p[0] / p[2], k.cy + k.f * p[1] / p[2]) for p in (a, b))
     return _clip(start, stop, k)
 
 
-def _across_image(l: Array, k: Intrinsics) -> Array | None:
-    """(2, 2) where a line crosses the image."""
+def _across_image(l: Sequence[float], k: Intrinsics) -> Ends | None:
+    """Where a line crosses the image."""
     if abs(l[1]) >= abs(l[0]):
         a, b = ((u, -(l[2] + l[0] * u) / l[1]) for u in (-0.5, k.width - 0.5))
     else:
@@ -126,7 +144,7 @@ def _across_image(l: Array, k: Intrinsics) -> Array | None:
     return _clip(a, b, k)
 
 
-def _clip(a: tuple[float, float], b: tuple[float, float], k: Intrinsics) -> Array | None:
+def _clip(a: tuple[float, float], b: tuple[float, float], k: Intrinsics) -> Ends | None:
     """Liang-Barsky: the part of a-b inside the image; None if there is none."""
     (u, v), du, dv = a, b[0] - a[0], b[1] - a[1]
     enter, leave = 0.0, 1.0
@@ -139,4 +157,4 @@ def _clip(a: tuple[float, float], b: tuple[float, float], k: Intrinsics) -> Arra
             enter = max(enter, room / step)
         else:
             leave = min(leave, room / step)
-    return np.array([[u + enter * du, v + enter * dv], [u + leave * du, v + leave * dv]]) if enter < leave else None
+    return ((u + enter * du, v + enter * dv), (u + leave * du, v + leave * dv)) if enter < leave else None

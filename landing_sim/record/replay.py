@@ -8,6 +8,7 @@ Positions are in R, local to the threshold: the viewer's float32 would lose them
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +20,7 @@ from landing_sim.record import overlay, shapes
 from landing_sim.record.channels import ERRORS, MODE_COLOURS, RANGING, SERIES, SPANS, events
 from landing_sim.record.log import FlightLog
 from landing_sim.record.viewer import ReplayError, open_viewer, start_live_viewer
-from landing_sim.signals import Estimate, Feature, Status, Step
+from landing_sim.signals import Estimate, Measurement, Residuals, Step
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -31,6 +32,8 @@ SIGHT = 30.0  # [m]
 TRUE_COLOUR, ESTIMATE_COLOUR, BAND_COLOUR = (60, 220, 120), (255, 170, 40), (150, 150, 165)
 OTHER_COLOUR = (120, 150, 255)
 IMAGE = "world/camera/image"
+TOGETHER = 32  # images sent at once
+FEATURES, STATUSES = overlay.packed(overlay.FEATURE_COLOURS), overlay.packed(overlay.STATUS_COLOURS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +50,17 @@ class Scene:
     title: str = "landing-sim"
     start: tuple[float, float, float] = (-950.0, -85.0, -51.0)  # [m] p_RB at t = 0: where the watching eye begins
     ranged: bool = False  # the runway's size is not known on board
+
+
+@dataclass(frozen=True, slots=True)
+class _Shot:
+    """An image and what is drawn over it, until it is sent."""
+
+    t: float  # [s]
+    jpeg: bytes
+    predicted: overlay.Segments | None
+    edges: Measurement | None
+    residuals: Residuals | None
 
 
 class Recorder:
@@ -68,6 +82,7 @@ class Recorder:
         self._next_frame = -np.inf
         self._live = live
         self._past: deque[Estimate] = deque(maxlen=64)
+        self._shots: list[_Shot] = []
         self._stream = rr.RecordingStream("landing-sim", recording_id=path.stem)
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
@@ -93,30 +108,12 @@ class Recorder:
         # from when it was due, not from when an image came: the rate is kept on average
         due = self._next_frame if self._next_frame > step.truth.t - self._period else step.truth.t
         self._next_frame = due + self._period
-        rr, stream = _rerun(), self._stream
-        stream.set_time(TIMELINE, duration=step.truth.t)
-        stream.log(IMAGE, rr.EncodedImage(contents=_jpeg(sample.frame.full()), media_type="image/jpeg"))
         then = min(self._past, key=lambda estimate: abs(estimate.t - exposed))  # an image may be old when it arrives
-        if then.valid:
-            lines = overlay.predicted_edges(then, sample.pan, sample.tilt, self._scene.camera)
-            colours = [overlay.FEATURE_COLOURS[Feature(f)] for f in lines.feature]
-            stream.log(f"{IMAGE}/predicted", rr.LineStrips2D(lines.ends, colors=colours, radii=0.8, draw_order=10.0))
+        predicted = overlay.predicted_edges(then, sample.pan, sample.tilt, self._scene.camera) if then.valid else None
         edges = next((m for m in step.measurements if m.geometry is not None), None)
-        if edges is not None and edges.geometry is not None:
-            geometry = edges.geometry
-            residuals = step.residuals
-            judged = (
-                geometry.status
-                if residuals is None or len(residuals.status) != len(geometry.status)
-                else residuals.status
-            )
-            status = [overlay.STATUS_COLOURS[Status(s)] for s in judged]
-            found = overlay.measured_edges(geometry, edges.z)
-            boxes = overlay.window_boxes(geometry)
-            stream.log(f"{IMAGE}/windows", rr.LineStrips2D(boxes, colors=status, radii=0.5, draw_order=20.0))
-            stream.log(
-                f"{IMAGE}/measured", rr.LineStrips2D(found.ends, colors=(255, 255, 0), radii=1.2, draw_order=30.0)
-            )
+        self._shots.append(_Shot(step.truth.t, _jpeg(sample.frame.full()), predicted, edges, step.residuals))
+        if self._live or len(self._shots) == TOGETHER:
+            self._send()
         if self._live:
             self._follow(step)
 
@@ -125,6 +122,7 @@ class Recorder:
 
         other : another flight to be seen beside this one: its path, its aircraft as a ghost, its series
         """
+        self._send()
         record_log(self._stream, log)
         if other is not None:
             body = shapes.aircraft(self._scene.span, self._scene.fuselage)
@@ -132,6 +130,38 @@ class Recorder:
             record_other(self._stream, other)
         self._stream.flush()
         self._stream.disconnect()
+
+    def _send(self) -> None:
+        """Images and what is drawn over them, in columns: a call a column costs as much as a call an image."""
+        shots, self._shots = self._shots, []
+        rr = _rerun()
+
+        def send(entity: str, which: Sequence[_Shot], columns: Any) -> None:
+            self._stream.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=[s.t for s in which])], columns)
+
+        def strips(entity: str, which: Sequence[_Shot], counts: Any, ends: np.ndarray, **colours: np.ndarray) -> None:
+            columns = rr.LineStrips2D.columns(strips=ends.astype(np.float32), **colours)
+            send(f"{IMAGE}/{entity}", which, columns.partition(counts))
+
+        if shots:
+            send(IMAGE, shots, rr.EncodedImage.columns(blob=[s.jpeg for s in shots]))
+        known = [(s, s.predicted) for s in shots if s.predicted is not None]
+        if known:
+            ends, feature = (np.concatenate(c) for c in zip(*((lines.ends, lines.feature) for _, lines in known)))
+            counts = [len(lines.ends) for _, lines in known]
+            strips("predicted", [s for s, _ in known], counts, ends, colors=FEATURES[feature])
+        looked = [(s, s.edges, s.edges.geometry) for s in shots if s.edges is not None and s.edges.geometry is not None]
+        if looked:
+            which, counts = [s for s, _, _ in looked], [len(edges.z) for _, edges, _ in looked]
+            windows, z = overlay.joined([g for _, _, g in looked]), np.concatenate([edges.z for _, edges, _ in looked])
+            judged = np.concatenate([
+                s.residuals.status if s.residuals is not None and len(s.residuals.status) == len(g.status) else g.status
+                for s, _, g in looked
+            ])  # fmt: skip
+            strips("windows", which, counts, overlay.window_boxes(windows), colors=STATUSES[judged])
+            image = np.repeat(np.arange(len(which)), counts)[overlay.found(windows, z)]
+            found = np.bincount(image, minlength=len(which))
+            strips("measured", which, found, overlay.measured_edges(windows, z).ends)
 
     def _follow(self, step: Step) -> None:
         rr, truth, stream = _rerun(), step.truth, self._stream
@@ -173,6 +203,10 @@ class Recorder:
             color=(255, 255, 255, 90),
         )
         stream.log(IMAGE, pinhole, static=True)
+        stream.log(IMAGE, rr.EncodedImage.from_fields(media_type="image/jpeg"), static=True)
+        for drawn, order, radius in (("predicted", 10.0, 0.8), ("windows", 20.0, 0.5), ("measured", 30.0, 1.2)):
+            stream.log(f"{IMAGE}/{drawn}", rr.LineStrips2D.from_fields(draw_order=order, radii=radius), static=True)
+        stream.log(f"{IMAGE}/measured", rr.LineStrips2D.from_fields(colors=(255, 255, 0)), static=True)
         for entity, *_ in ERRORS:
             names = ["error", "+3 sigma", "-3 sigma"]
             style = rr.SeriesLines(
