@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from landing_sim.estimators.observer import scene as sc
 from landing_sim.estimators.observer.bearings import bearings
-from landing_sim.estimators.observer.gibert import Gibert, GibertConfig
+from landing_sim.estimators.observer.gibert import Gibert, GibertConfig, correct_range
 from landing_sim.estimators.observer.kinematic_ekf import EkfConfig, KinematicEkf
 from landing_sim.estimators.observer.looking import Image
 from landing_sim.estimators.observer.runway_observer import NAMES, ObserverConfig, RunwayObserver
@@ -223,7 +223,7 @@ def ranged(ranging: Gibert | KinematicEkf, scale: float, sigma: float, seed: int
             scene = ranging.start(scene_at(p, 45.0, scale), start_covariance(), t)
         else:
             scene = ranging.move(scene, p - last, DT)
-        level = replace(carriage(z, scene.s), R_RB=R_RB, v_R=v)  # a flat Earth: what is tested is ranging
+        level = carriage(z, scene.s)._replace(R_RB=R_RB, v_R=v)  # a flat Earth: what is tested is ranging
         scene = ranging.look(scene, Image(t, m, z), level)
         out.append((t, scene.s[sc.X] / p[0] - 1.0, scene.spread))
         last = p
@@ -277,7 +277,8 @@ def test_whatever_is_seen_the_range_stays_finite_and_does_not_jump(
 ) -> None:
     g = Gibert(GibertConfig(), LENS)
     var = np.full(3, 1e-8)
-    ahead, width, d, spread = g._range(np.array(p[:3]), p[3], np.array(y), var, np.array(v), 0.5, DT)
+    ahead = np.array(p[:3])
+    width, d, spread = correct_range(ahead, p[3], np.array(y), var, np.array(v), 0.5, DT, 0.0, g._use, g._rule)
     assert np.isfinite([*ahead, width, *d, spread]).all()
     assert abs(ahead[0] / p[0] - 1.0) <= 0.0205 and ahead[0] >= 30.0
 

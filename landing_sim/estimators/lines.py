@@ -18,14 +18,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from landing_sim.estimators.line_fit import (
+    CENTRE,
+    COLUMNS,
+    COV,
+    DROPPED,
+    NO_PRIOR,
+    NORMAL,
+    USED,
+    cross_rows,
+    fit_row,
+    fit_rows,
+)
 from landing_sim.geometry.pinhole import Intrinsics
-from landing_sim.geometry.vanishing import down_from_level_line, lifted
-from landing_sim.jit import kernel
-from landing_sim.signals import EdgeSet, Feature, Status
+from landing_sim.signals import EdgeSet
 from landing_sim.types import Array
-
-_ITERATIONS = 4
-_LEAST_SLANT = 0.05  # n . s of windows that search along the line itself: they say nothing of where it is
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,12 +70,6 @@ class ImageLine:
     def homogeneous(self) -> Array:
         """(3,): l . (u, v, 1) = 0, unit normal."""
         return np.array([self.n[0], self.n[1], -self.offset])
-
-    @property
-    def gradient(self) -> Array:
-        """(3, 2) of l by the two errors of which cov is the covariance."""
-        t = np.array([-self.n[1], self.n[0]])
-        return np.array([[0.0, t[0]], [0.0, t[1]], [-1.0, -float(t @ self.centre)]])
 
     def sigma_at(self, uv: Array) -> float:
         """[px] standard deviation of the line's place normal to itself near the point (2,)."""
@@ -120,99 +121,6 @@ def held_to(point: Crossings, line: ImageLine, sigma: float = 0.0) -> Crossings:
     return Crossings(uv[None], cov - np.outer(gain, line.n @ cov))
 
 
-@kernel
-def _fit(
-    p: Array, s: Array, var: Array, keep: np.ndarray, prior: Array, least: float
-) -> tuple[bool, Array, Array, Array, float]:
-    """ok, n (2,), centre (2,), cov (2, 2), squared normalised residuals; prior (4,): normal, sigma, whether given."""
-    n, c, cov = np.zeros(2), np.zeros(2), np.zeros((2, 2))
-    w = s_u = s_v = 0.0
-    for i in range(len(p)):
-        if keep[i]:
-            w += 1.0 / var[i]
-            c += p[i] / var[i]
-            s_u += s[i, 0]
-            s_v += s[i, 1]
-    if w == 0.0:
-        return False, n, c, cov, 0.0
-    c /= w
-    if prior[3] > 0.0:
-        n[:] = prior[:2]
-    else:
-        uu = uv = vv = 0.0
-        for i in range(len(p)):
-            if keep[i]:
-                du, dv = p[i, 0] - c[0], p[i, 1] - c[1]
-                uu, uv, vv = uu + du * du / var[i], uv + du * dv / var[i], vv + dv * dv / var[i]
-        along = 0.5 * math.atan2(2.0 * uv, uu - vv)
-        n[0], n[1] = -math.sin(along), math.cos(along)
-    if n[0] * s_u + n[1] * s_v < 0.0:
-        n *= -1.0
-    chi2 = 0.0
-    for turn in range(_ITERATIONS + 1):
-        ee = ea = aa = be = ba = chi2 = 0.0
-        lo, hi = math.inf, -math.inf
-        t_u, t_v = -n[1], n[0]
-        for i in range(len(p)):
-            slant = n[0] * s[i, 0] + n[1] * s[i, 1]
-            if not keep[i] or abs(slant) < _LEAST_SLANT:
-                continue
-            du, dv = p[i, 0] - c[0], p[i, 1] - c[1]
-            across, along = n[0] * du + n[1] * dv, t_u * du + t_v * dv
-            lo, hi = min(lo, along), max(hi, along)
-            q = 1.0 / (slant * slant * var[i])
-            ee, ea, aa = ee + q, ea - q * along, aa + q * along * along
-            be, ba = be + q * across, ba - q * across * along
-            chi2 += q * across * across
-        if prior[3] > 0.0:
-            turned = (prior[0] * t_u + prior[1] * t_v) * (1.0 if prior[0] * n[0] + prior[1] * n[1] >= 0.0 else -1.0)
-            q = 1.0 / (prior[2] * prior[2])
-            aa, ba, chi2 = aa + q, ba + q * turned, chi2 + q * turned * turned
-        elif not hi - lo >= least:
-            return False, n, c, cov, 0.0
-        det = ee * aa - ea * ea
-        if not det > 0.0:
-            return False, n, c, cov, 0.0
-        if turn == _ITERATIONS:
-            cov[0, 0], cov[1, 1] = aa / det, ee / det
-            cov[0, 1] = cov[1, 0] = -ea / det
-            break
-        e, a = (aa * be - ea * ba) / det, (ee * ba - ea * be) / det
-        c += e * n
-        ca, sa = math.cos(a), math.sin(a)
-        n[0], n[1] = ca * n[0] - sa * n[1], sa * n[0] + ca * n[1]
-    return True, n, c, cov, chi2
-
-
-@kernel
-def _robust(
-    p: Array, s: Array, var: Array, prior: Array, least: float, limit: float
-) -> tuple[bool, Array, Array, Array, int]:
-    """The line, with the one window left out that contradicts all others; index of it or -1."""
-    m = len(p)
-    keep = np.ones(m, dtype=np.bool_)
-    ok, n, c, cov, chi2 = _fit(p, s, var, keep, prior, least)
-    free = m - 2 + (1 if prior[3] > 0.0 else 0)
-    if not ok or free < 1 or chi2 <= limit * limit:
-        return ok, n, c, cov, -1
-    worst = -1
-    if free >= 2:
-        best = math.inf
-        for i in range(m):
-            keep[i] = False
-            fits, n_i, c_i, cov_i, chi2_i = _fit(p, s, var, keep, prior, least)
-            keep[i] = True
-            if fits and chi2_i < best:
-                best, worst = chi2_i, i
-                n, c, cov = n_i, c_i, cov_i
-        chi2, free = best, free - 1
-        if worst < 0:
-            return False, n, c, cov, -1
-    if chi2 > limit * limit:  # more than one, or too few to tell which
-        cov = cov * (chi2 / free)
-    return True, n, c, cov, worst
-
-
 def fit_line(
     points: Array,
     directions: Array,
@@ -227,17 +135,27 @@ def fit_line(
     None for fewer than two points, or less than config.min_baseline between them.
     """
     k = config or LineConfig()
-    prior = np.zeros(4)
-    if expected is not None:
-        prior[:2], prior[2], prior[3] = expected[0], expected[1], 1.0
-    if len(points) < (1 if expected is not None else 2):
-        return None
-    ok, n, c, cov, out = _robust(
+    row = np.empty(COLUMNS)
+    fit_row(
         np.ascontiguousarray(points), np.ascontiguousarray(directions), np.ascontiguousarray(variances),
-        prior, k.min_baseline, k.limit,
+        _prior(expected), k.min_baseline, k.limit, row,
     )  # fmt: skip
-    dropped = int(out >= 0)
-    return ImageLine(n, c, cov, len(points) - dropped, dropped) if ok else None
+    return _line(row)
+
+
+def _prior(expected: tuple[Array, float] | None) -> Array:
+    return NO_PRIOR if expected is None else np.array([*expected[0], expected[1], 1.0])
+
+
+def _line(row: Array) -> ImageLine | None:
+    if row[USED] == 0.0:
+        return None
+    cov = np.array([[row[COV], row[COV + 1]], [row[COV + 1], row[COV + 2]]])
+    return ImageLine(row[NORMAL : NORMAL + 2], row[CENTRE : CENTRE + 2], cov, int(row[USED]), int(row[DROPPED]))
+
+
+def _row(line: ImageLine) -> Array:
+    return np.array([*line.n, *line.centre, line.cov[0, 0], line.cov[0, 1], line.cov[1, 1], line.used, line.dropped])
 
 
 def runway_lines(
@@ -254,23 +172,12 @@ def runway_lines(
     dip [rad] of the horizon: the points seen on it are raised by as much, so that `horizon` is the line at which level
     lines vanish (dip 0: a straight line through what is seen). threshold_normal: see `fit_line`, `threshold_direction`.
     """
-    found = edges.status == Status.FOUND
-    points = edges.centre + z[:, None] * edges.direction
-
-    def line(feature: Feature, expected: tuple[Array, float] | None = None) -> ImageLine | None:
-        ok = found & (edges.feature == feature)
-        return fit_line(points[ok], edges.direction[ok], R[ok], config, expected)
-
-    horizon = line(Feature.HORIZON)
-    if horizon is not None and dip != 0.0:
-        ok = found & (edges.feature == Feature.HORIZON)
-        down = down_from_level_line(horizon.homogeneous, lens)
-        for _ in range(3):
-            horizon = fit_line(lifted(points[ok], down, dip, lens), edges.direction[ok], R[ok], config)
-            if horizon is None:
-                break
-            down = down_from_level_line(horizon.homogeneous, lens)
-    return RunwayLines(line(Feature.LEFT), line(Feature.RIGHT), line(Feature.THRESHOLD, threshold_normal), horizon)
+    k = config or LineConfig()
+    rows = fit_rows(
+        z, R, edges.feature, edges.status, edges.centre, edges.direction, np.array([lens.f, lens.cx, lens.cy]), dip,
+        _prior(threshold_normal), k.min_baseline, k.limit,
+    )  # fmt: skip
+    return RunwayLines(*(_line(row) for row in rows))
 
 
 def crossings(pairs: Sequence[tuple[ImageLine, ImageLine]]) -> Crossings | None:
@@ -278,22 +185,9 @@ def crossings(pairs: Sequence[tuple[ImageLine, ImageLine]]) -> Crossings | None:
     lines: list[ImageLine] = []
     for pair in pairs:
         lines += [line for line in pair if not any(line is known for known in lines)]
-    uv, J = np.empty((len(pairs), 2)), np.zeros((2 * len(pairs), 2 * len(lines)))
-    for k, (a, b) in enumerate(pairs):
-        x = np.cross(a.homogeneous, b.homogeneous)
-        if abs(x[2]) < 1e-9:
-            return None
-        uv[k] = x[:2] / x[2]
-        # n_a . dp = da, n_b . dp = db, where da is by how much line a moves along its normal at the point
-        inverse = np.linalg.inv(np.array([a.n, b.n]))
-        for row, line in enumerate((a, b)):
-            moves = -np.array([uv[k, 0], uv[k, 1], 1.0]) @ line.gradient
-            at = next(i for i, known in enumerate(lines) if known is line)
-            J[2 * k : 2 * k + 2, 2 * at : 2 * at + 2] += np.outer(inverse[:, row], moves)
-    cov = np.zeros((2 * len(lines), 2 * len(lines)))
-    for i, line in enumerate(lines):
-        cov[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = line.cov
-    return Crossings(uv, J @ cov @ J.T)
+    at = [[next(i for i, known in enumerate(lines) if known is line) for line in pair] for pair in pairs]
+    ok, uv, cov = cross_rows(np.array([_row(line) for line in lines]), np.array(at, dtype=np.int64))
+    return Crossings(uv, cov) if ok else None
 
 
 def threshold_direction(uv: Array, R_CL: Array, dpsi: float, lens: Intrinsics) -> Array:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from landing_sim.geometry.so3 import from_euler
+from landing_sim.jit import kernel
 from landing_sim.types import Array
 
 A = 6378137.0  # [m] semi-major axis, WGS84
@@ -103,6 +104,7 @@ class RunwayFrame:
         return self.R_RE @ ned_from_ecef(latitude, longitude).T
 
 
+@kernel
 def level_at(p_R: Array) -> Array:
     """R_LR (3, 3): the runway's axes, levelled where p_R (3,) [m] is, on a sphere: 0.045 degrees at 5 km."""
     return from_euler(-p_R[1] / A, p_R[0] / A, 0.0)

@@ -60,6 +60,26 @@ def camera_from_body(pan: float, tilt: float) -> Array:
 
 
 @kernel
+def product(A: Array, B: Array) -> Array:
+    """A B of two 3x3 matrices."""
+    out = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j]
+    return out
+
+
+@kernel
+def turned(R: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """R v of the vector v = (x, y, z)."""
+    return (
+        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
+        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z,
+        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z,
+    )
+
+
+@kernel
 def wrap(angle: float) -> float:
     """The same angle in (-pi, pi]."""
     return math.atan2(math.sin(angle), math.cos(angle))

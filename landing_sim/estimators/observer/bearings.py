@@ -12,18 +12,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from landing_sim.estimators.lines import RunwayLines, runway_lines, threshold_direction
+from landing_sim.estimators.line_fit import CENTRE, COV, USED, cross_rows, fit_rows
+from landing_sim.estimators.lines import LineConfig
 from landing_sim.geometry.pinhole import Intrinsics
-from landing_sim.geometry.runway_image import horizon_dip
-from landing_sim.geometry.so3 import camera_from_body, from_euler, to_euler
-from landing_sim.geometry.vanishing import down_from_level_line, heading_from_point, roll_and_pitch
-from landing_sim.signals import EdgeSet, Feature, Status
+from landing_sim.geometry.runway_image import HORIZON, LEFT, RIGHT, THRESHOLD, horizon_dip
+from landing_sim.geometry.so3 import camera_from_body, from_euler, product, to_euler, turned
+from landing_sim.geometry.vanishing import down_of
+from landing_sim.jit import kernel
+from landing_sim.signals import EdgeSet
 from landing_sim.types import Array
 
+_MIN_BASELINE, _LIMIT = LineConfig().min_baseline, LineConfig().limit
+_FOUND = 0  # of signals.Status
 LEVEL_SIGMA = 2e-3  # [rad] of the roll that is believed
 SHORT = 20.0  # [px] between windows that then tell the threshold's direction worse than the roll does
 
@@ -53,79 +57,164 @@ def bearings(
     R_RB (3, 3): attitude as believed; camera_error [rad]: of the pan and tilt read; height [m] of the camera, for the dip.
     "horizon" takes roll and pitch from the image, where it shows the horizon, and "inertial" from R_RB.
     """
-    R_CB = camera_from_body(edges.pan - camera_error[0], edges.tilt - camera_error[1])
-    lines = runway_lines(z, R, edges, lens, horizon_dip(height), None, _level_threshold(edges, R_CB @ R_RB.T, lens))
-    if attitude == "horizon" and lines.horizon is not None:
-        phi, theta = roll_and_pitch(down_from_level_line(lines.horizon.homogeneous, lens), R_CB)
-        R_RB = from_euler(phi, theta, to_euler(R_RB)[2])
-    pitched = None
-    if lines.horizon is not None:
-        theta = roll_and_pitch(down_from_level_line(lines.horizon.homogeneous, lens), R_CB)[1]
-        pitched = float(to_euler(R_RB)[1]) - theta
-    R_RC = R_RB @ R_CB.T
-    point, turned = lines.vanishing, None
-    if point is not None and _ahead(R_RC, point.uv[0], lens):
-        J = _turn_by_pixel(R_RC, point.uv[0], lens)
-        turned = np.array(heading_from_point(point.uv[0], R_RC, lens)), J @ point.cov @ J.T
-    return Bearings(turned, pitched, _threshold(lines, R_RC, lens), _borders(lines, R_RC, lens))
+    seen = see(
+        z, R, edges.feature, edges.status, edges.centre, edges.direction, edges.pan - camera_error[0],
+        edges.tilt - camera_error[1], np.array([lens.f, lens.cx, lens.cy]), R_RB, height, attitude == "horizon",
+    )  # fmt: skip
+    return Bearings(
+        None if math.isnan(seen.turned[0]) else (seen.turned, seen.turned_cov),
+        None if math.isnan(seen.pitched) else seen.pitched,
+        None if math.isnan(seen.y[0]) else (seen.y, seen.y_var),
+        None if math.isnan(seen.k[0]) else (seen.k, seen.k_var),
+    )
 
 
-def _level_threshold(edges: EdgeSet, R_CR: Array, lens: Intrinsics) -> tuple[Array, float] | None:
-    """The direction that a level threshold across the runway must have, where its windows are too close to tell."""
-    seen = edges.centre[(edges.feature == Feature.THRESHOLD) & (edges.status == Status.FOUND)]
-    if len(seen) == 0 or np.ptp(seen, axis=0).max() > SHORT:
-        return None
-    return threshold_direction(seen.mean(axis=0), R_CR, 0.0, lens), LEVEL_SIGMA
+class Seen(NamedTuple):
+    """`Bearings` with NaN for what the image does not show."""
+
+    turned: Array
+    turned_cov: Array
+    pitched: float
+    y: Array
+    y_var: Array
+    k: Array
+    k_var: Array
 
 
-def _ray(R_RC: Array, uv: Array, lens: Intrinsics) -> Array:
-    return np.asarray(R_RC @ np.array([(uv[0] - lens.cx) / lens.f, (uv[1] - lens.cy) / lens.f, 1.0]))
+@kernel
+def see(
+    z: Array, R: Array, feature: np.ndarray, status: np.ndarray, centre: Array, direction: Array, pan: float, tilt: float,
+    lens: Array, R_RB: Array, height: float, by_horizon: bool,
+) -> Seen:  # fmt: skip
+    """`bearings` of edges seen by a camera at pan and tilt [rad] as they are believed to be; lens (3,) f, cx, cy."""
+    seen = Seen(
+        np.full(2, np.nan), np.full((2, 2), np.nan), np.nan, np.full(3, np.nan), np.full(3, np.nan), np.full(2, np.nan),
+        np.full(2, np.nan),
+    )  # fmt: skip
+    R_BC = camera_from_body(pan, tilt).T.copy()
+    level = _level_threshold(feature, status, centre, product(R_RB, R_BC), lens)
+    rows = fit_rows(z, R, feature, status, centre, direction, lens, horizon_dip(height), level, _MIN_BASELINE, _LIMIT)
+    pitched = math.nan
+    horizon = rows[HORIZON]
+    if horizon[USED] > 0.0:
+        c = -(horizon[0] * horizon[CENTRE] + horizon[1] * horizon[CENTRE + 1])
+        down = down_of(horizon[0], horizon[1], c, lens[0], lens[1], lens[2])
+        down = turned(R_BC, down[0], down[1], down[2])
+        theta = math.asin(min(1.0, max(-1.0, -down[0])))
+        if by_horizon:
+            R_RB = from_euler(math.atan2(down[1], down[2]), theta, to_euler(R_RB)[2])
+        pitched = to_euler(R_RB)[1] - theta
+    R_RC = product(R_RB, R_BC)
+    _see_vanishing(rows, R_RC, lens, seen.turned, seen.turned_cov)
+    _see_threshold(rows, R_RC, lens, seen.y, seen.y_var)
+    _see_borders(rows, R_RC, lens, seen.k, seen.k_var)
+    return Seen(seen.turned, seen.turned_cov, pitched, seen.y, seen.y_var, seen.k, seen.k_var)
 
 
-def _turn_by_pixel(R_RC: Array, uv: Array, lens: Intrinsics) -> Array:
-    """(2, 2) derivative of heading and rise of a point at infinity by its pixel."""
-    w = _ray(R_RC, uv, lens)
-    ahead = math.hypot(w[0], w[1])
-    along = (w[0] * R_RC[0, :2] + w[1] * R_RC[1, :2]) / ahead
-    heading = (w[0] * R_RC[1, :2] - w[1] * R_RC[0, :2]) / ahead**2
-    rise = -(ahead * R_RC[2, :2] - w[2] * along) / (ahead**2 + w[2] ** 2)
-    return np.array([heading, rise]) / lens.f
+@kernel
+def _level_threshold(feature: np.ndarray, status: np.ndarray, centre: Array, R_RC: Array, lens: Array) -> Array:
+    """Prior (4,) of `fit_row`: the direction that a level threshold across the runway must have, where its windows are too
+    close to tell."""
+    prior, lo, hi, mean = np.zeros(4), np.full(2, np.inf), np.full(2, -np.inf), np.zeros(2)
+    m = 0
+    for i in range(len(feature)):
+        if feature[i] == THRESHOLD and status[i] == _FOUND:
+            m += 1
+            for k in range(2):
+                mean[k] += centre[i, k]
+                lo[k], hi[k] = min(lo[k], centre[i, k]), max(hi[k], centre[i, k])
+    if m == 0 or max(hi[0] - lo[0], hi[1] - lo[1]) > SHORT:
+        return prior
+    u, v = mean[0] / m - lens[1], mean[1] / m - lens[2]
+    across_u, across_v = lens[0] * R_RC[1, 0] - u * R_RC[1, 2], lens[0] * R_RC[1, 1] - v * R_RC[1, 2]
+    along_u, along_v = lens[0] * R_RC[0, 0] - u * R_RC[0, 2], lens[0] * R_RC[0, 1] - v * R_RC[0, 2]
+    size = math.hypot(across_u, across_v)
+    if across_u * along_v - across_v * along_u < 0.0:
+        size = -size
+    prior[0], prior[1], prior[2], prior[3] = -across_v / size, across_u / size, LEVEL_SIGMA, 1.0
+    return prior
 
 
-def _ahead(R_RC: Array, uv: Array, lens: Intrinsics) -> bool:
-    return bool(_ray(R_RC, uv, lens)[0] > 0.05)
+@kernel
+def _ray(R_RC: Array, u: float, v: float, lens: Array) -> tuple[float, float, float]:
+    return turned(R_RC, (u - lens[1]) / lens[0], (v - lens[2]) / lens[0], 1.0)
 
 
-def _threshold(lines: RunwayLines, R_RC: Array, lens: Intrinsics) -> tuple[Array, Array] | None:
-    corners = lines.corners
-    if corners is None:
-        return None
-    left, right = (_ray(R_RC, uv, lens) for uv in corners.uv)
-    if left[0] <= 0.05 or right[0] <= 0.05:
-        return None
-    a, b = left[1:] / left[0], right[1:] / right[0]
-    # d(r_i / r_1) by the pixel
-    J = np.zeros((3, 4))
-    for k, ray in enumerate((left, right)):
-        g = (R_RC[1:, :2] - np.outer(ray[1:] / ray[0], R_RC[0, :2])) / (lens.f * ray[0])
-        J[:2, 2 * k : 2 * k + 2] = 0.5 * g
-        J[2, 2 * k : 2 * k + 2] = g[0] if k else -g[0]
-    y = np.array([0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), b[0] - a[0]])
-    if not y[2] > 0.0:
-        return None
-    return y, np.einsum("ij,jk,ik->i", J, corners.cov, J)
+@kernel
+def _see_vanishing(rows: Array, R_RC: Array, lens: Array, out: Array, cov: Array) -> None:
+    """Heading and rise of the borders' vanishing point and their covariance."""
+    if rows[LEFT, USED] == 0.0 or rows[RIGHT, USED] == 0.0:
+        return
+    ok, uv, cov_uv = cross_rows(rows, np.array([[LEFT, RIGHT]]))
+    w = _ray(R_RC, uv[0, 0], uv[0, 1], lens)
+    if not ok or w[0] <= 0.05:
+        return
+    level = math.hypot(w[0], w[1])
+    out[0], out[1] = math.atan2(w[1], w[0]), math.atan2(-w[2], level)
+    J = np.empty((2, 2))
+    for k in range(2):
+        along = (w[0] * R_RC[0, k] + w[1] * R_RC[1, k]) / level
+        J[0, k] = (w[0] * R_RC[1, k] - w[1] * R_RC[0, k]) / (level * level * lens[0])
+        J[1, k] = -(level * R_RC[2, k] - w[2] * along) / ((level * level + w[2] * w[2]) * lens[0])
+    _carried(J, cov_uv, cov)
 
 
-def _borders(lines: RunwayLines, R_RC: Array, lens: Intrinsics) -> tuple[Array, Array] | None:
-    """At the middle of what is seen of each, where a wrong heading matters least for the least noise."""
-    k, var = np.empty(2), np.empty(2)
-    for i, line in enumerate((lines.left, lines.right)):
-        if line is None:
-            return None
-        ray = _ray(R_RC, line.centre, lens)
-        if ray[2] <= 1e-3 * math.hypot(ray[0], ray[1]):
-            return None
-        k[i] = ray[1] / ray[2]
-        across = (R_RC[1, :2] - k[i] * R_RC[2, :2]) @ line.n / (lens.f * ray[2])
-        var[i] = across * across * line.cov[0, 0]
-    return (k, var) if k[1] > k[0] else None
+@kernel
+def _see_threshold(rows: Array, R_RC: Array, lens: Array, y: Array, var: Array) -> None:
+    """y1, y2, s of the threshold's corners and their variances."""
+    if rows[LEFT, USED] == 0.0 or rows[RIGHT, USED] == 0.0 or rows[THRESHOLD, USED] == 0.0:
+        return
+    ok, uv, cov_uv = cross_rows(rows, np.array([[THRESHOLD, LEFT], [THRESHOLD, RIGHT]]))
+    left, right = _ray(R_RC, uv[0, 0], uv[0, 1], lens), _ray(R_RC, uv[1, 0], uv[1, 1], lens)
+    if not ok or left[0] <= 0.05 or right[0] <= 0.05:
+        return
+    s = right[1] / right[0] - left[1] / left[0]
+    if not s > 0.0:
+        return
+    y[0], y[1] = 0.5 * (left[1] / left[0] + right[1] / right[0]), 0.5 * (left[2] / left[0] + right[2] / right[0])
+    y[2] = s
+    J = np.zeros((3, 4))  # d(r_i / r_1) by the pixel
+    for corner in range(2):
+        ray, sign = (left, -1.0) if corner == 0 else (right, 1.0)
+        for k in range(2):
+            for i in range(2):
+                g = (R_RC[1 + i, k] - ray[1 + i] / ray[0] * R_RC[0, k]) / (lens[0] * ray[0])
+                J[i, 2 * corner + k] = 0.5 * g
+                if i == 0:
+                    J[2, 2 * corner + k] = sign * g
+    full = np.empty((3, 3))
+    _carried(J, cov_uv, full)
+    for i in range(3):
+        var[i] = full[i, i]
+
+
+@kernel
+def _see_borders(rows: Array, R_RC: Array, lens: Array, k: Array, var: Array) -> None:
+    """k of the borders, at the middle of what is seen of each, where a wrong heading matters least for the least noise."""
+    at, spread = np.empty(2), np.empty(2)
+    for i in range(2):
+        line = rows[i]
+        ray = _ray(R_RC, line[CENTRE], line[CENTRE + 1], lens)
+        if line[USED] == 0.0 or ray[2] <= 1e-3 * math.hypot(ray[0], ray[1]):
+            return
+        at[i] = ray[1] / ray[2]
+        across = 0.0
+        for j in range(2):
+            across += (R_RC[1, j] - at[i] * R_RC[2, j]) * line[j] / (lens[0] * ray[2])
+        spread[i] = across * across * line[COV]
+    if at[1] > at[0]:
+        for i in range(2):
+            k[i], var[i] = at[i], spread[i]
+
+
+@kernel
+def _carried(J: Array, cov: Array, out: Array) -> None:
+    """out = J cov J'."""
+    m, n = J.shape
+    for i in range(m):
+        for j in range(m):
+            acc = 0.0
+            for a in range(n):
+                for b in range(n):
+                    acc += J[i, a] * cov[a, b] * J[j, b]
+            out[i, j] = acc

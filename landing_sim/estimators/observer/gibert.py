@@ -17,20 +17,21 @@ Source     Gibert et al. 2015, eqs. (7)-(13). Departs: its inverse of dPsi/dx (a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from landing_sim.estimators.observer import scene as sc
-from landing_sim.estimators.observer.bearings import Bearings, bearings
+from landing_sim.estimators.observer.bearings import Seen, see
 from landing_sim.estimators.observer.looking import Image
 from landing_sim.estimators.observer.scene import Carriage, Scene
 from landing_sim.estimators.ranging.fused import correct, faded
 from landing_sim.estimators.ranging.gains import pole_pair
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.geometry.runway_image import horizon_dip
-from landing_sim.geometry.so3 import from_euler
+from landing_sim.geometry.so3 import from_euler, product
+from landing_sim.jit import kernel
 from landing_sim.types import Array
 
 RAD = math.pi / 180.0
@@ -64,12 +65,16 @@ class Gibert:
     """looking.Ranging with gains that depend on time alone."""
 
     def __init__(self, config: GibertConfig, lens: Intrinsics) -> None:
-        self.config, self._lens = config, lens
+        self.config = config
+        self._lens = np.array([lens.f, lens.cx, lens.cy])
         self._use = np.array(
             {"both": (1.0, 1.0, 1.0), "width": (0.0, 0.0, 1.0), "point": (1.0, 1.0, 0.0)}[config.outputs]
         )
-        self._floors = np.array([config.floor, config.floor, 0.0])
-        self._common = np.array([config.bearing_floor**2, config.bearing_floor**2, 0.0])
+        c = config
+        self._rule = Rule(
+            c.bandwidth, c.later, c.hurry, c.bearing_rate, c.eps, c.floor, c.limit, c.velocity_sigma, c.bearing_floor,
+            c.images, c.course_drift, c.tilt_drift, c.least_range,
+        )  # fmt: skip
 
     def start(self, s: Array, P: Array, t: float) -> Scene:
         """The course is the camera's: what its mounting turns it by, this observer cannot tell from the runway's."""
@@ -79,43 +84,22 @@ class Gibert:
         return Scene(s, P, self.config.first_spread, t, t)
 
     def move(self, scene: Scene, way_R: Array, dt: float) -> Scene:
-        s = sc.moved(scene.s, way_R, dt)
-        P = scene.P.copy()
-        P[sc.COURSE, sc.COURSE] += self.config.course_drift**2 * dt
-        P[sc.ETILT, sc.ETILT] += self.config.tilt_drift**2 * dt
-        spread = scene.spread
-        if scene.threshold_in_view:  # carried: the error stays in metres while the range shrinks
-            before, now = abs(scene.s[sc.X]), max(abs(s[sc.X]), self.config.least_range)
-            spread = spread * before / now + self.config.velocity_sigma * dt / now
-        return replace(scene, s=s, P=P, spread=spread)
+        s, P, spread = _move(scene.s, scene.P, scene.spread, way_R, dt, scene.threshold_in_view, self._rule)
+        return scene._replace(s=s, P=P, spread=spread)
 
     def look(self, scene: Scene, image: Image, carried: Carriage) -> Scene:
-        c, m = self.config, image.edges
-        s = scene.s
-        if m.geometry is None:
+        m = image.edges
+        edges = m.geometry
+        if edges is None:
             raise ValueError("a measurement of kind 'edges' needs its EdgeSet")
-        ahead = np.array([-s[sc.X], -s[sc.Y], s[sc.H]])  # from the camera to the threshold's middle, R
-        R_RB = carried.R_RB if s[sc.EROLL] == 0.0 else carried.R_RB @ from_euler(s[sc.EROLL], 0.0, 0.0)
-        seen = bearings(m.z, m.R, m.geometry, self._lens, R_RB, (s[sc.EPAN], s[sc.ETILT]), float(ahead[2]), c.attitude)
-        if seen.turned is None and seen.borders is None and seen.threshold is None:
-            return replace(scene, misses=scene.misses + 1, threshold_in_view=False)
-        s, P = s.copy(), scene.P.copy()
-        turn = self._course(s, P, seen, 0.5 * scene.spread * horizon_dip(float(ahead[2])))
-        ahead[:2] = _turned(ahead[:2], turn)
-        dt = min(max(image.t - scene.t_image, 1e-3), 0.5)
-        d, spread = (0.0, 0.0, 0.0), scene.spread
-        in_view = seen.threshold is not None and ahead[0] > 0.0
-        if seen.threshold is not None and ahead[0] > 0.0:
-            y, var = seen.threshold
-            ahead, s[sc.WIDTH], d, spread = self._range(
-                ahead, s[sc.WIDTH], _bearings_turned(y, turn), var, carried.v_R, spread, dt, image.t - scene.t_start
-            )
-        elif seen.borders is not None:
-            ahead = self._borders(ahead, s[sc.WIDTH], *seen.borders, dt)
-        s[sc.X], s[sc.Y], s[sc.H] = -ahead[0], -ahead[1], ahead[2]
-        self._cover(s, P, spread)
-        return replace(
-            scene,
+        s, P, spread, d, shown, in_view = _look(
+            scene.s, scene.P, scene.spread, image.t - scene.t_image, image.t - scene.t_start, m.z, m.R, edges.feature,
+            edges.status, edges.centre, edges.direction, edges.pan, edges.tilt, self._lens, carried.R_RB, carried.v_R,
+            self.config.attitude == "horizon", self._use, self._rule,
+        )  # fmt: skip
+        if not shown:
+            return scene._replace(misses=scene.misses + 1, threshold_in_view=False)
+        return scene._replace(
             s=s,
             P=P,
             spread=spread,
@@ -126,80 +110,146 @@ class Gibert:
             frames=scene.frames + 1,
         )
 
-    def _course(self, s: Array, P: Array, seen: Bearings, dip: float) -> float:
-        """The course and the tilt error follow the vanishing point; returns by how much the axes have turned [rad].
 
-        The point lies best along the borders' own direction, which is neither heading nor rise: the two are estimated
-        together, with the horizon's say on the tilt, as far as the scale of its dip is known.
-        """
-        c, pair = self.config, np.ix_((sc.COURSE, sc.ETILT), (sc.COURSE, sc.ETILT))
-        C, off = P[pair], np.zeros(2)
-        if seen.pitched is not None:
-            gain = C[:, 1] / (C[1, 1] + c.images * (dip**2 + c.bearing_floor**2))
-            off = gain * seen.pitched
-            C = C - np.outer(gain, C[1])
-        if seen.turned is not None:
-            z, R = seen.turned
-            R = c.images * (R + c.bearing_floor**2 * np.eye(2))
-            gain2 = C @ np.linalg.inv(C + R)
-            off = off + gain2 @ (z - off)
-            C = C - gain2 @ C
-        P[pair] = 0.5 * (C + C.T)
-        s[[sc.COURSE, sc.ETILT]] += off
-        return float(off[0])
+class Rule(NamedTuple):
+    """What the kernels need of `GibertConfig`."""
 
-    def _range(
-        self, ahead: Array, width: float, y: Array, var: Array, v_R: Array, spread: float, dt: float, since: float = 0.0
-    ) -> tuple[Array, float, tuple[float, float, float], float]:
-        """Way to the threshold (3,), width, d and spread after one correction."""
-        c = self.config
-        omega = c.bandwidth * (c.later + (1.0 - c.later) * math.exp(-since / c.hurry))
-        rho = 1.0 / max(float(ahead[0]), c.least_range)
-        was = np.array([ahead[1] * rho, ahead[2] * rho, width * rho])
-        d = np.array([v_R[0] * was[0] - v_R[1], v_R[0] * was[1] - v_R[2], v_R[0] * was[2]])
-        var = var + self._common
-        weights = faded(self._use * float(np.min(var)) / var, d, self._floors)
-        e = y - was
-        # poles: the range's twice for the width, the range's and the bearings' for these
-        l1, l2 = pole_pair(1.0, omega, dt)
-        fast, slow = 1.0 - math.exp(-c.bearing_rate * dt), 1.0 - math.exp(-omega * dt)
-        share = np.array([fast / slow, fast / slow, 1.0])
-        got = correct(was, rho, e * share, d, weights, (l1, l2), c.eps, c.limit)
-        below = got.observed**2 + c.eps**2
-        noise = l2 * math.sqrt(float(np.sum((weights * d * share) ** 2 * var))) / (below * rho)
-        spread = math.hypot(spread * (1.0 - got.observed**2 / below * 0.5 * omega * dt), noise)
-        X = max(1.0 / got.rho, c.least_range)
-        bearing = was[:2] + fast * e[:2]
-        return np.array([X, *(bearing * X)]), float(got.z[2] * X), (float(d[0]), float(d[1]), float(d[2])), spread
-
-    def _borders(self, ahead: Array, width: float, k: Array, var: Array, dt: float) -> Array:
-        """Height and offset from the borders, whose distance is known by now."""
-        gain = 1.0 - math.exp(-self.config.bearing_rate * dt)
-        Z = width / (k[1] - k[0])
-        sigma = Z * math.sqrt(var[0] + var[1]) / (k[1] - k[0])
-        if abs(Z - ahead[2]) > 2.0 + 4.0 * sigma + 0.2 * Z:
-            return ahead
-        Y = 0.5 * (k[0] + k[1]) * Z
-        return np.array([ahead[0], ahead[1] + gain * (Y - ahead[1]), ahead[2] + gain * (Z - ahead[2])])
-
-    def _cover(self, s: Array, P: Array, spread: float) -> None:
-        """Covariance of place and width: one scale, and what bearings leave."""
-        length = np.array([s[sc.X], s[sc.Y], s[sc.H], s[sc.WIDTH]])
-        free = 1e-3 * max(abs(s[sc.X]), 50.0)
-        rows = [sc.X, sc.Y, sc.H, sc.WIDTH]
-        P[np.ix_(rows, rows)] = spread**2 * np.outer(length, length) + np.diag(
-            [(10.0 * free) ** 2, free**2, free**2, 0.0]
-        )
+    bandwidth: float
+    later: float
+    hurry: float
+    bearing_rate: float
+    eps: float
+    floor: float
+    limit: float
+    velocity_sigma: float
+    bearing_floor: float
+    images: float
+    course_drift: float
+    tilt_drift: float
+    least_range: float
 
 
-def _turned(v: Array, angle: float) -> Array:
-    """(2,) in axes turned by `angle` to the right."""
-    c, w = math.cos(angle), math.sin(angle)
-    return np.array([c * v[0] + w * v[1], c * v[1] - w * v[0]])
+@kernel
+def _move(
+    s: Array, P: Array, spread: float, way_R: Array, dt: float, threshold_in_view: bool, c: Rule
+) -> tuple[Array, Array, float]:
+    """s, P, spread after the cg has moved by way_R (3,) [m] in dt [s]."""
+    out, P = sc.moved(s, way_R, dt), P.copy()
+    P[sc.COURSE, sc.COURSE] += c.course_drift**2 * dt
+    P[sc.ETILT, sc.ETILT] += c.tilt_drift**2 * dt
+    if threshold_in_view:  # carried: the error stays in metres while the range shrinks
+        before, now = abs(s[sc.X]), max(abs(out[sc.X]), c.least_range)
+        spread = spread * before / now + c.velocity_sigma * dt / now
+    return out, P, spread
 
 
-def _bearings_turned(y: Array, angle: float) -> Array:
-    """y1, y2, s in axes turned by `angle` to the right."""
-    c, w = math.cos(angle), math.sin(angle)
-    ahead = c + y[0] * w
-    return np.array([(y[0] * c - w) / ahead, y[1] / ahead, y[2] / ahead**2])
+@kernel
+def _look(
+    s: Array, P: Array, spread: float, dt: float, since: float, z: Array, R: Array, feature: np.ndarray,
+    status: np.ndarray, centre: Array, direction: Array, pan: float, tilt: float, lens: Array, R_RB: Array, v_R: Array,
+    by_horizon: bool, use: Array, c: Rule,
+) -> tuple[Array, Array, float, tuple[float, float, float], bool, bool]:  # fmt: skip
+    """s, P, spread, d after an image, whether it showed anything, and whether the threshold; edges as `bearings.see` has
+    them, dt and since [s] from the last image and from the start."""
+    s, P, d = s.copy(), P.copy(), (0.0, 0.0, 0.0)
+    ahead = np.array([-s[sc.X], -s[sc.Y], s[sc.H]])  # from the camera to the threshold's middle, R
+    if s[sc.EROLL] != 0.0:
+        R_RB = product(R_RB, from_euler(s[sc.EROLL], 0.0, 0.0))
+    seen = see(
+        z, R, feature, status, centre, direction, pan - s[sc.EPAN], tilt - s[sc.ETILT], lens, R_RB, ahead[2], by_horizon
+    )
+    borders, threshold = not math.isnan(seen.k[0]), not math.isnan(seen.y[0])
+    if not (borders or threshold) and math.isnan(seen.turned[0]):
+        return s, P, spread, d, False, False
+    turn = _course(s, P, seen, 0.5 * spread * horizon_dip(ahead[2]), c)
+    cos, sin = math.cos(turn), math.sin(turn)  # into axes turned to the right by as much
+    ahead[0], ahead[1] = cos * ahead[0] + sin * ahead[1], cos * ahead[1] - sin * ahead[0]
+    dt = min(max(dt, 1e-3), 0.5)
+    in_view = threshold and ahead[0] > 0.0
+    if in_view:
+        y, along = seen.y, cos + seen.y[0] * sin
+        y[0], y[1], y[2] = (y[0] * cos - sin) / along, y[1] / along, y[2] / along**2
+        s[sc.WIDTH], d, spread = correct_range(ahead, s[sc.WIDTH], y, seen.y_var, v_R, spread, dt, since, use, c)
+    elif borders:
+        _borders(ahead, s[sc.WIDTH], seen.k, seen.k_var, 1.0 - math.exp(-c.bearing_rate * dt))
+    s[sc.X], s[sc.Y], s[sc.H] = -ahead[0], -ahead[1], ahead[2]
+    _cover(s, P, spread)
+    return s, P, spread, d, True, in_view
+
+
+@kernel
+def _course(s: Array, P: Array, seen: Seen, dip: float, c: Rule) -> float:
+    """The course and the tilt error follow the vanishing point; returns by how much the axes have turned [rad].
+
+    The point lies best along the borders' own direction, which is neither heading nor rise: the two are estimated
+    together, with the horizon's say on the tilt, as far as the scale of its dip is known.
+    """
+    a, b, e = P[sc.COURSE, sc.COURSE], P[sc.COURSE, sc.ETILT], P[sc.ETILT, sc.ETILT]
+    course = tilt = 0.0
+    if not math.isnan(seen.pitched):
+        below = e + c.images * (dip**2 + c.bearing_floor**2)
+        course, tilt = b / below * seen.pitched, e / below * seen.pitched
+        a, b, e = a - b * b / below, b - b * e / below, e - e * e / below
+    if not math.isnan(seen.turned[0]):
+        floor, cov = c.bearing_floor**2, seen.turned_cov
+        p = a + c.images * (cov[0, 0] + floor)
+        q = b + c.images * cov[0, 1]
+        r = e + c.images * (cov[1, 1] + floor)
+        det = p * r - q * q
+        g00, g01 = (a * r - b * q) / det, (b * p - a * q) / det
+        g10, g11 = (b * r - e * q) / det, (e * p - b * q) / det
+        off_course, off_tilt = seen.turned[0] - course, seen.turned[1] - tilt
+        course, tilt = course + g00 * off_course + g01 * off_tilt, tilt + g10 * off_course + g11 * off_tilt
+        a, b, e = a - g00 * a - g01 * b, b - 0.5 * (g00 * b + g01 * e + g10 * a + g11 * b), e - g10 * b - g11 * e
+    P[sc.COURSE, sc.COURSE], P[sc.ETILT, sc.ETILT] = a, e
+    P[sc.COURSE, sc.ETILT] = P[sc.ETILT, sc.COURSE] = b
+    s[sc.COURSE] += course
+    s[sc.ETILT] += tilt
+    return course
+
+
+@kernel
+def correct_range(
+    ahead: Array, width: float, y: Array, var: Array, v_R: Array, spread: float, dt: float, since: float, use: Array,
+    c: Rule,
+) -> tuple[float, tuple[float, float, float], float]:  # fmt: skip
+    """One correction of the way to the threshold `ahead` (3,), in place; returns width, d and spread."""
+    omega = c.bandwidth * (c.later + (1.0 - c.later) * math.exp(-since / c.hurry))
+    rho = 1.0 / max(ahead[0], c.least_range)
+    was = np.array([ahead[1] * rho, ahead[2] * rho, width * rho])
+    d = np.array([v_R[0] * was[0] - v_R[1], v_R[0] * was[1] - v_R[2], v_R[0] * was[2]])
+    # poles: the range's twice for the width, the range's and the bearings' for these
+    l1, l2 = pole_pair(1.0, omega, dt)
+    fast, slow = 1.0 - math.exp(-c.bearing_rate * dt), 1.0 - math.exp(-omega * dt)
+    share = np.array([fast / slow, fast / slow, 1.0])
+    common = np.array([c.bearing_floor**2, c.bearing_floor**2, 0.0])
+    var = var + common
+    weights = faded(use * np.min(var) / var, d, np.array([c.floor, c.floor, 0.0]))
+    e = y - was
+    got = correct(was, rho, e * share, d, weights, (l1, l2), c.eps, c.limit)
+    below = got.observed**2 + c.eps**2
+    noise = l2 * math.sqrt(np.sum((weights * d * share) ** 2 * var)) / (below * rho)
+    spread = math.hypot(spread * (1.0 - got.observed**2 / below * 0.5 * omega * dt), noise)
+    X = max(1.0 / got.rho, c.least_range)
+    ahead[0], ahead[1], ahead[2] = X, (was[0] + fast * e[0]) * X, (was[1] + fast * e[1]) * X
+    return got.z[2] * X, (d[0], d[1], d[2]), spread
+
+
+@kernel
+def _borders(ahead: Array, width: float, k: Array, var: Array, gain: float) -> None:
+    """Height and offset in `ahead` (3,) from the borders, whose distance is known by now."""
+    Z = width / (k[1] - k[0])
+    sigma = Z * math.sqrt(var[0] + var[1]) / (k[1] - k[0])
+    if abs(Z - ahead[2]) <= 2.0 + 4.0 * sigma + 0.2 * Z:
+        ahead[1] += gain * (0.5 * (k[0] + k[1]) * Z - ahead[1])
+        ahead[2] += gain * (Z - ahead[2])
+
+
+@kernel
+def _cover(s: Array, P: Array, spread: float) -> None:
+    """Covariance of place and width: one scale, and what bearings leave."""
+    rows, free = (sc.X, sc.Y, sc.H, sc.WIDTH), 1e-3 * max(abs(s[sc.X]), 50.0)
+    left = ((10.0 * free) ** 2, free**2, free**2, 0.0)
+    for i in range(4):
+        for j in range(4):
+            P[rows[i], rows[j]] = spread**2 * s[rows[i]] * s[rows[j]] + (left[i] if i == j else 0.0)

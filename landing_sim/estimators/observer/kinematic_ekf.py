@@ -14,7 +14,7 @@ Source     measurement: Dickmanns & Schell 1992, eq. (4), see edge_model.py; the
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -145,8 +145,7 @@ class KinematicEkf:
         s[sc.WIDTH] = 1.0 / mu
         s[XI] = (scene.s[XI] / W + step[XI]) / mu
         dof = int(use.sum())
-        after = replace(
-            scene,
+        after = scene._replace(
             t_image=image.t,
             d=sc.observability(s, carried.v_R),
             misses=0 if dof else scene.misses + 1,
@@ -163,4 +162,4 @@ class KinematicEkf:
         T[XI, XI] *= W
         T[XI, MU] = -s[XI] * W
         T[MU, MU] = -W * W
-        return replace(scene, s=s, own=own, P=T @ own @ T.T, spread=W * math.sqrt(max(own[MU, MU], 0.0)))
+        return scene._replace(s=s, own=own, P=T @ own @ T.T, spread=W * math.sqrt(max(own[MU, MU], 0.0)))

@@ -12,15 +12,17 @@ Source     Gibert et al. 2015, section 4.2; the acquisition gives the first ray,
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from landing_sim.estimators.observer import scene as sc
 from landing_sim.estimators.observer.looking import Image, Ranging
-from landing_sim.estimators.observer.scene import Scene, carriage
+from landing_sim.estimators.observer.scene import Scene, carriage, from_course
 from landing_sim.geometry.runway_image import horizon_dip
-from landing_sim.geometry.so3 import from_euler, to_euler, wrap
+from landing_sim.geometry.so3 import from_euler, to_euler, turned, wrap
+from landing_sim.jit import kernel
 from landing_sim.signals import Command, Estimate, Measurement
 from landing_sim.types import Array
 
@@ -29,12 +31,21 @@ NAMES = (
     *("u", "v", "w", "p", "q", "r", "phi", "theta", "psi", "x", "y", "H"),
     *("wx", "wy", "wz", "epan", "etilt", "W", "spread", "d1", "d2", "dW"),
 )
-# rows of NAMES from the scene's states, and the variances of those that come from instruments
-_OF_SCENE = np.zeros((len(NAMES), sc.N))
-for _name, _state, _sign in (("x", sc.X, 1), ("y", sc.Y, 1), ("H", sc.H, 1), ("psi", sc.COURSE, -1), ("W", sc.WIDTH, 1),
-                             ("epan", sc.EPAN, 1), ("etilt", sc.ETILT, 1)):  # fmt: skip
-    _OF_SCENE[NAMES.index(_name), _state] = _sign
-_REST = np.diag(np.square([*[0.2] * 3, *[0.05 * RAD] * 6, *[0.02] * 3, *[1.0] * 3, *[1e-5] * 2, 1e-3, *[1e-3] * 4]))
+# rows of NAMES that are states of the scene: row, state, sign; and the variances of those that come from instruments
+_ROWS: np.ndarray = np.array(
+    [
+        (8, sc.COURSE, -1),
+        (9, sc.X, 1),
+        (10, sc.Y, 1),
+        (11, sc.H, 1),
+        (15, sc.EPAN, 1),
+        (16, sc.ETILT, 1),
+        (17, sc.WIDTH, 1),
+    ]
+)
+_REST: Array = np.square(
+    np.array([*[0.2] * 3, *[0.05 * RAD] * 6, *[0.02] * 3, *[1.0] * 3, *[1e-5] * 2, 1e-3, *[1e-3] * 4])
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,16 +61,18 @@ class ObserverConfig:
     lost_after: int = 30  # images that showed nothing
 
 
-@dataclass(frozen=True, slots=True)
-class Memory:
-    """All that the observer remembers; never changed in place."""
+_STILL = np.zeros(3)
+
+
+class Memory(NamedTuple):
+    """All that the observer remembers; never changed in place. A tuple: dozens are made where an image is late."""
 
     t: float
     scene: Scene | None = None  # at the time of the last inertial reading
     inertial: Array | None = None  # (12,) the last reading
     t_inertial: float = -math.inf
     airspeed: float = math.nan
-    wind: Array = field(default_factory=lambda: np.zeros(3))
+    wind: Array = _STILL
     t_wind: float = -math.inf
     on_ground: bool = False
     trusted: bool = False
@@ -78,7 +91,7 @@ class RunwayObserver:
 
     def predict(self, memory: Memory, command: Command, t: float) -> Memory:
         """Time passes; the next inertial reading says what happened meanwhile."""
-        return memory if t <= memory.t else replace(memory, t=t)
+        return memory if t <= memory.t else memory._replace(t=t)
 
     def update(self, memory: Memory, measurement: Measurement) -> Memory:
         """Raises ValueError for a measurement of a kind it has no use for."""
@@ -86,11 +99,12 @@ class RunwayObserver:
             case "inertial":
                 return self._inertial(memory, measurement.z)
             case "airspeed":
-                return replace(memory, airspeed=float(measurement.z[0]))
+                return memory._replace(airspeed=float(measurement.z[0]))
             case "flow_angles":
                 return self._wind(memory, measurement.z)
             case "on_ground":
-                return replace(memory, on_ground=bool(measurement.z[0] > 0.5))
+                down = bool(measurement.z[0] > 0.5)
+                return memory if down == memory.on_ground else memory._replace(on_ground=down)
             case "pose":
                 return self._start(memory, measurement)
             case "edges":
@@ -104,36 +118,25 @@ class RunwayObserver:
         scene, z = memory.scene, memory.inertial
         if scene is None or z is None:
             return Estimate(memory.t, NAMES, np.zeros(len(NAMES)), None, False, {"on_ground": memory.on_ground})
-        s = scene.s
-        carried = carriage(z, s)
-        since = memory.t - memory.t_inertial
-        way = carried.v_R * since - carried.R_RB @ self._lever
-        p = s[sc.X], s[sc.Y], s[sc.H]
-        p = p[0] + way[0], p[1] + way[1], p[2] - way[2]
-        uvw = carried.R_RB.T @ carried.v_R
-        phi, theta, psi = to_euler(carried.R_RB)
-        mean = np.array([
-            *uvw, *z[3:6], phi, theta, psi, *p, *memory.wind,
-            s[sc.EPAN], s[sc.ETILT], s[sc.WIDTH], scene.spread, *scene.d,
-        ])  # fmt: skip
+        mean = _mean(
+            z, scene.s, memory.t - memory.t_inertial, self._lever, memory.wind, scene.spread, scene.d[0], scene.d[1],
+            scene.d[2],
+        )  # fmt: skip
         flags = {
             "threshold_in_view": scene.threshold_in_view,
             "on_ground": memory.on_ground,
             "lost": scene.misses >= self.config.lost_after and not memory.on_ground,
             "range_valid": memory.trusted,
         }
-        return Estimate(memory.t, NAMES, mean, self._covariance(scene), True, flags, scene.residuals)
+        return Estimate(memory.t, NAMES, mean, _covariance(scene.P), True, flags, scene.residuals)
 
     # ------------------------------------------------------------------------------------------- updates
 
     def _inertial(self, memory: Memory, z: Array) -> Memory:
         scene, dt = memory.scene, memory.t - memory.t_inertial
         if scene is not None and memory.inertial is not None:
-            before = memory.inertial
-            R_RN = sc.from_course(scene.s)
-            lever = (from_euler(z[0], z[1], z[2]) - from_euler(before[0], before[1], before[2])) @ self._lever
-            scene = self.ranging.move(scene, R_RN @ (z[9:12] + lever), dt)
-        return replace(memory, inertial=z, t_inertial=memory.t, scene=scene)
+            scene = self.ranging.move(scene, _way(scene.s, memory.inertial, z, self._lever), dt)
+        return memory._replace(inertial=z, t_inertial=memory.t, scene=scene)
 
     def _wind(self, memory: Memory, flow: Array) -> Memory:
         """What is left of the velocity over the ground when the one through the air is taken off, smoothed.
@@ -143,14 +146,11 @@ class RunwayObserver:
         V = memory.airspeed
         if memory.scene is None or memory.inertial is None or memory.on_ground or not V > 0.0:
             return memory
-        carried = carriage(memory.inertial, memory.scene.s)
-        alpha, beta = float(flow[0]), float(flow[1])
-        forward = V * math.cos(beta)
-        air = np.array([forward * math.cos(alpha), V * math.sin(beta), forward * math.sin(alpha)])
-        wind = carried.v_R - carried.R_RB @ air
         dt = memory.t - memory.t_wind
         share = dt / (dt + self.config.wind_filter) if math.isfinite(dt) else 1.0
-        return replace(memory, wind=memory.wind + share * (wind - memory.wind), t_wind=memory.t)
+        return memory._replace(
+            wind=_wind(memory.inertial, memory.scene.s, flow, V, memory.wind, share), t_wind=memory.t
+        )
 
     def _start(self, memory: Memory, m: Measurement) -> Memory:
         """From an acquired pose: the ray is believed, the range on it is the guess; a scale that is trusted stays."""
@@ -180,7 +180,7 @@ class RunwayObserver:
         P[sc.EPAN, sc.EPAN] = c.camera_sigma**2
         P[sc.COURSE, sc.COURSE] += c.camera_sigma**2
         P[sc.COURSE, sc.EPAN] = P[sc.EPAN, sc.COURSE] = -(c.camera_sigma**2)
-        return replace(memory, scene=self.ranging.start(s, P, memory.t))
+        return memory._replace(scene=self.ranging.start(s, P, memory.t))
 
     def _look(self, memory: Memory, m: Measurement) -> Memory:
         if memory.scene is None or memory.inertial is None:
@@ -188,7 +188,60 @@ class RunwayObserver:
         scene = self.ranging.look(
             memory.scene, Image(memory.t, m, memory.inertial), carriage(memory.inertial, memory.scene.s)
         )
-        return replace(memory, scene=scene, trusted=memory.trusted or scene.spread <= self.config.trust)
+        return memory._replace(scene=scene, trusted=memory.trusted or scene.spread <= self.config.trust)
 
-    def _covariance(self, scene: Scene) -> Array:
-        return np.asarray(_OF_SCENE @ scene.P @ _OF_SCENE.T + _REST)
+
+@kernel
+def _mean(
+    z: Array, s: Array, since: float, lever: Array, wind: Array, spread: float, d1: float, d2: float, d3: float
+) -> Array:
+    """Mean of `read` (22,): the cg, `since` [s] after the inertial reading z (12,), from the camera's place s (N,)."""
+    R_RB, v_R = carriage(z, s)
+    out = np.empty(len(NAMES))
+    arm = turned(R_RB, lever[0], lever[1], lever[2])
+    for k in range(3):
+        out[k] = R_RB[0, k] * v_R[0] + R_RB[1, k] * v_R[1] + R_RB[2, k] * v_R[2]
+        out[3 + k], out[12 + k] = z[3 + k], wind[k]
+        out[9 + k] = s[k] + (-1.0 if k == 2 else 1.0) * (v_R[k] * since - arm[k])
+    angles = to_euler(R_RB)
+    out[6], out[7], out[8] = angles[0], angles[1], angles[2]
+    out[15], out[16], out[17], out[18] = s[sc.EPAN], s[sc.ETILT], s[sc.WIDTH], spread
+    out[19], out[20], out[21] = d1, d2, d3
+    return out
+
+
+@kernel
+def _covariance(P: Array) -> Array:
+    """Covariance of `read` (22, 22) from the scene's (N, N)."""
+    out = np.zeros((len(NAMES), len(NAMES)))
+    for i in range(len(_ROWS)):
+        for j in range(len(_ROWS)):
+            out[_ROWS[i, 0], _ROWS[j, 0]] = _ROWS[i, 2] * _ROWS[j, 2] * P[_ROWS[i, 1], _ROWS[j, 1]]
+    for i in range(len(NAMES)):
+        out[i, i] += _REST[i]
+    return out
+
+
+@kernel
+def _way(s: Array, before: Array, z: Array, lever: Array) -> Array:
+    """(3,) [m] of the camera in R between two inertial readings (12,)."""
+    then = turned(from_euler(before[0], before[1], before[2]), lever[0], lever[1], lever[2])
+    now = turned(from_euler(z[0], z[1], z[2]), lever[0], lever[1], lever[2])
+    way, out = (
+        turned(from_course(s), z[9] + now[0] - then[0], z[10] + now[1] - then[1], z[11] + now[2] - then[2]),
+        np.empty(3),
+    )
+    out[0], out[1], out[2] = way
+    return out
+
+
+@kernel
+def _wind(z: Array, s: Array, flow: Array, V: float, before: Array, share: float) -> Array:
+    """(3,) [m/s] wind in R: the velocity over the ground less that through the air, `share` of it new."""
+    R_RB, v_R = carriage(z, s)
+    forward = V * math.cos(flow[1])
+    air = turned(R_RB, forward * math.cos(flow[0]), V * math.sin(flow[1]), forward * math.sin(flow[0]))
+    out = np.empty(3)
+    for k in range(3):
+        out[k] = before[k] + share * (v_R[k] - air[k] - before[k])
+    return out

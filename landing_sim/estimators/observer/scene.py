@@ -12,13 +12,13 @@ Source     Gibert et al. 2015, section 4.2. Departs: eq. (17) holds as printed o
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from landing_sim.geometry.earth import level_at
-from landing_sim.geometry.so3 import from_euler
+from landing_sim.geometry.so3 import from_euler, product, turned
+from landing_sim.jit import kernel
 from landing_sim.signals import Residuals
 from landing_sim.types import Array
 
@@ -26,8 +26,7 @@ X, Y, H, COURSE, WIDTH, EPAN, ETILT, EROLL, SIDE, NEAR, BX, BY, BZ = range(13)
 N = 13
 
 
-@dataclass(frozen=True, slots=True)
-class Scene:
+class Scene(NamedTuple):
     """What is believed of the runway and of the way to it. s (N,): x, y, H of the camera [m], the runway's true course
     [rad], its width [m], the camera's pan, tilt and roll error [rad], by how much borders and threshold are measured too
     far inside [px], and the inertial velocity's bias [m/s] in R."""
@@ -45,37 +44,41 @@ class Scene:
     residuals: Residuals | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Carriage:
+class Carriage(NamedTuple):
     """The aircraft in the runway's frame: what an inertial reading says under a believed course and place."""
 
     R_RB: Array  # (3, 3)
     v_R: Array  # (3,) [m/s] of the cg
 
 
+@kernel
 def carriage(z: Array, s: Array) -> Carriage:
     """`z` (12,) of an "inertial" measurement seen from the runway `s` (N,).
 
     The unit is level where the aircraft is, R at the threshold: 0.045 degrees and two metres apart over 5 km.
     """
     R_RN = from_course(s)
-    return Carriage(R_RN @ from_euler(z[0], z[1], z[2]), R_RN @ z[6:9] - s[BX:])
+    v_R, over = np.empty(3), turned(R_RN, z[6], z[7], z[8])
+    for k in range(3):
+        v_R[k] = over[k] - s[BX + k]
+    return Carriage(product(R_RN, from_euler(z[0], z[1], z[2])), v_R)
 
 
+@kernel
 def from_course(s: Array) -> Array:
     """R_RN (3, 3) where the aircraft is."""
-    c, w = math.cos(s[COURSE]), math.sin(s[COURSE])
-    R_LN = np.array([[c, w, 0.0], [-w, c, 0.0], [0.0, 0.0, 1.0]])
-    return np.asarray(level_at(np.array([s[X], s[Y], -s[H]])).T @ R_LN)
+    R_LR = level_at(np.array([s[X], s[Y], -s[H]]))
+    R_NL = from_euler(0.0, 0.0, s[COURSE])
+    return product(R_NL, R_LR).T.copy()
 
 
+@kernel
 def moved(s: Array, way_R: Array, dt: float) -> Array:
     """`s` after the camera has moved by way_R (3,) [m] in dt [s], as the inertial unit says."""
     out = s.copy()
-    way = way_R - s[BX:] * dt
-    out[X] += way[0]
-    out[Y] += way[1]
-    out[H] -= way[2]
+    out[X] += way_R[0] - s[BX] * dt
+    out[Y] += way_R[1] - s[BY] * dt
+    out[H] -= way_R[2] - s[BZ] * dt
     return out
 
 

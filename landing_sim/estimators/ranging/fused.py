@@ -22,6 +22,7 @@ import numpy as np
 from landing_sim.estimators.ranging.contract import Flag, Motion, State, arrive, on_ray
 from landing_sim.estimators.ranging.gains import pole_pair
 from landing_sim.estimators.ranging.perspective import drift
+from landing_sim.jit import kernel
 from landing_sim.types import Array
 
 
@@ -34,6 +35,7 @@ class Corrected(NamedTuple):
     limited: bool  # the correction was larger than allowed and was cut
 
 
+@kernel
 def correct(
     z: Array,
     rho: float,
@@ -65,6 +67,7 @@ def correct(
     return Corrected(z + gains[0] * e, rho + allowed, math.sqrt(power), allowed != change)
 
 
+@kernel
 def faded(weights: Array, d: Array, floors: Array) -> Array:
     """Weights (m,) times d^2 / (d^2 + floor^2): an output whose d [m/s] is small against its floor loses its say.
 

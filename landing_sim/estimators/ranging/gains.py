@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from landing_sim.jit import kernel
+
 
 @dataclass(frozen=True, slots=True)
 class HighGain:
@@ -45,6 +47,7 @@ class SuperTwisting:
     layer: float = 1e-3
 
 
+@kernel
 def pole_pair(xi: float, omega: float, dt: float) -> tuple[float, float]:
     """l1, l2 [1/s] with which y += l1 e, rate += l2 e after an exact prediction have the poles of xi, omega sampled at dt.
 
