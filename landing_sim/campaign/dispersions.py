@@ -50,7 +50,8 @@ def _sobol(dimensions: int, seed: int, run: int) -> Array:
 
     engine = _engine(dimensions, seed)
     engine.reset()
-    engine.fast_forward(run)
+    if run:
+        engine.fast_forward(run)
     return np.asarray(ndtri(np.clip(engine.random(1)[0], 1e-15, 1.0 - 1e-15)))
 
 

@@ -1,0 +1,49 @@
+"""What workers do in tests of campaigns: importable by them, unlike what a test module defines."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+from landing_sim.campaign.file import Plan
+from landing_sim.campaign.landing import Landing, land
+
+
+def dies_once(plan: Plan, run: int) -> Landing:
+    """Landing 2 takes its first worker with it; the file named in CAMPAIGN_TEST remembers."""
+    mark = Path(os.environ["CAMPAIGN_TEST"])
+    if run == 2 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return land(plan, run)
+
+
+def kills(plan: Plan, run: int) -> Landing:
+    """Landing 1 takes every worker with it, landing 3 is beyond our code."""
+    if run == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if run == 3:
+        raise ZeroDivisionError("run 3 divides by zero")
+    return Landing(run, "landed", values={"wind.crosswind_mps": float(run)})
+
+
+def cheap(plan: Plan, run: int) -> Landing:
+    """No flight."""
+    return Landing(run, "landed", values={"wind.crosswind_mps": float(run)})
+
+
+def square(number: int) -> int:
+    """Killed by 7."""
+    if number == 7:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number * number
+
+
+def no_worker(number: int) -> int:
+    """Never begun: its module cannot be loaded where CAMPAIGN_TEST says so."""
+    return number
+
+
+if os.environ.get("CAMPAIGN_TEST") == "broken":
+    os._exit(7)
