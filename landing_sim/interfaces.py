@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 from landing_sim.noise import NoiseStream
@@ -56,11 +56,12 @@ class Sensor(Protocol):
 
 
 class FrontEnd(Protocol):
-    """Pixels (or raw readings) into measurements; told where to look by the estimate at the sample's time."""
+    """Pixels (or raw readings) into measurements; where to look, the estimate at the sample's time tells."""
 
     sensor: str
 
-    def process(self, sample: Sample, estimate: Estimate) -> tuple[Measurement, ...]: ...
+    def process(self, sample: Sample, estimate: Callable[[], Estimate]) -> tuple[Measurement, ...]:
+        """`estimate` answers with what is believed at the sample's time: it costs something, and few need to ask."""
 
 
 class Estimator(Protocol):

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from landing_sim.interfaces import Controller, Estimator, FrontEnd, Guidance, Plant, Sensor, World
@@ -48,7 +49,7 @@ def take_in(
         front_end = front_ends.get(sample.sensor)
         if front_end is None:
             continue
-        for measurement in front_end.process(sample, estimator.read(memory, sample.t_valid)):
+        for measurement in front_end.process(sample, partial(estimator.read, memory, sample.t_valid)):
             memory = estimator.update(memory, measurement)
             measured.append(measurement)
     return memory, tuple(measured)
@@ -76,7 +77,8 @@ def simulate(
         if period % clock.cycle:
             raise ValueError(f"sensor {sensor.name!r}: a period of {sensor.period} s is not a whole number of cycles")
     truth = plant.reset()
-    tick = 0
+    tick, dt = 0, clock.dt
+    blow, fly, place = world.wind, plant.step, plant.fast_truth
     memory = estimator.init(0.0)
     guidance_memory, controller_memory = guidance.init(), controller.init()
     acting = trim
@@ -85,7 +87,7 @@ def simulate(
     last_seen = None  # the residuals of an image are passed on once
 
     while True:
-        t = tick * clock.dt
+        t = tick * dt
         camera = plant.camera()
 
         # what the sensors see now, and what has reached the computer by now
@@ -122,10 +124,9 @@ def simulate(
         # the world moves on
         for _ in range(clock.cycle):
             if pending and pending[0][0] <= tick:
-                memory = estimator.predict(memory, acting, tick * clock.dt)
+                memory = estimator.predict(memory, acting, tick * dt)
                 acting = pending.popleft()[1]
-            wind = world.wind(tick * clock.dt, *plant.fast_truth())
-            plant.step(acting, wind)
+            fly(acting, blow(tick * dt, *place()))
             tick += 1
         truth = plant.truth()
 

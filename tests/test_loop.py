@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import islice
 
 import numpy as np
@@ -62,7 +63,7 @@ class Eye:
 class Through:
     sensor = "eye"
 
-    def process(self, sample: Sample, estimate: Estimate) -> tuple[Measurement, ...]:
+    def process(self, sample: Sample, estimate: Callable[[], Estimate]) -> tuple[Measurement, ...]:
         z = np.array([float(sample.data)])
         return (Measurement("tick", sample.t_valid, sample.t_arrival, z, np.ones(1)),)
 

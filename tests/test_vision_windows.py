@@ -393,13 +393,13 @@ def test_front_end_tracks_what_is_known_and_acquires_what_is_not() -> None:
     bench, pose = Bench(), pose_of(APPROACH[3])
     front_end, (pan, tilt) = RunwayFrontEnd(bench.known, bench.camera), fixate(pose)
     sample = Sample("camera", 1.0, 1.06, bench.sample(bench.renderer(), pose, pan, tilt))
-    (edges,) = front_end.process(sample, estimate_of(pose))
+    (edges,) = front_end.process(sample, lambda: estimate_of(pose))
     assert (edges.kind, edges.t_valid, edges.t_arrival) == ("edges", 1.0, 1.06)
     assert edges.geometry is not None
     assert np.all(edges.geometry.status == FOUND)
     assert np.max(edges.z**2 / edges.R) < 16.0
     for estimate in (estimate_of(pose, valid=False), estimate_of(pose, lost=True)):
-        (acquired,) = front_end.process(sample, estimate)
+        (acquired,) = front_end.process(sample, lambda believed=estimate: believed)
         assert acquired.kind == "pose"
         assert np.abs(acquired.z - pose) == pytest.approx(0.0, abs=5.0)
 
@@ -412,7 +412,7 @@ def test_commanded_angles_are_told_where_there_are_no_encoders() -> None:
     z = {}
     for which in ("encoder", "commanded"):
         config = FrontEndConfig("3L3R2T2H", platform_angle=which)  # type: ignore[arg-type]
-        (m,) = RunwayFrontEnd(bench.known, bench.camera, config).process(skewed, estimate_of(pose))
+        (m,) = RunwayFrontEnd(bench.known, bench.camera, config).process(skewed, lambda: estimate_of(pose))
         assert m.geometry is not None
         z[which] = np.nanmax(np.abs(m.z))
         assert m.geometry.pan == (pan if which == "encoder" else pan + 0.1 * RAD)
@@ -420,7 +420,7 @@ def test_commanded_angles_are_told_where_there_are_no_encoders() -> None:
     assert z["commanded"] > 1.5  # 0.1 deg is 3.5 px
     # an estimated encoder bias is taken into account, the angle told is still the one read
     biased = Sample("camera", 0.0, 0.0, CameraSample(data.frame, 0, pan + 0.1 * RAD, tilt, pan, tilt))
-    (m,) = RunwayFrontEnd(bench.known, bench.camera).process(biased, estimate_of(pose, epan=0.1 * RAD))
+    (m,) = RunwayFrontEnd(bench.known, bench.camera).process(biased, lambda: estimate_of(pose, epan=0.1 * RAD))
     assert np.nanmax(np.abs(m.z)) < 0.1
     assert m.geometry is not None
     assert m.geometry.pan == pan + 0.1 * RAD
@@ -446,9 +446,9 @@ def test_bad_input_is_refused() -> None:
     sample = Sample("camera", 0.0, 0.0, bench.sample(bench.renderer(), pose, *fixate(pose)))
     front_end, names = RunwayFrontEnd(bench.known, camera), tuple(n for n in NAMES if n != "psi")
     with pytest.raises(ValueError, match="lacks psi"):
-        front_end.process(sample, Estimate(0.0, names, np.zeros(len(names)), None, True))
+        front_end.process(sample, lambda: Estimate(0.0, names, np.zeros(len(names)), None, True))
     with pytest.raises(ValueError, match="not finite"):
-        front_end.process(sample, Estimate(0.0, NAMES, np.full(len(NAMES), np.nan), None, True))
+        front_end.process(sample, lambda: Estimate(0.0, NAMES, np.full(len(NAMES), np.nan), None, True))
 
 
 def test_no_believed_pose_however_odd_brings_it_down() -> None:

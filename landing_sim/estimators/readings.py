@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from landing_sim.signals import Estimate, InertialReading, Measurement, Sample
+
+_MOST = 3  # numbers in a reading
 
 
 class Reading:
@@ -14,10 +18,11 @@ class Reading:
         self.sensor = sensor
         self.kind = kind
         self.variance = sigma * sigma
+        self._variances = np.full(_MOST, self.variance)
 
-    def process(self, sample: Sample, estimate: Estimate) -> tuple[Measurement, ...]:
-        z = np.atleast_1d(np.asarray(sample.data, dtype=float))
-        return (Measurement(self.kind, sample.t_valid, sample.t_arrival, z, np.full(z.shape, self.variance)),)
+    def process(self, sample: Sample, estimate: Callable[[], Estimate]) -> tuple[Measurement, ...]:
+        z = np.array(sample.data, dtype=float, ndmin=1)
+        return (Measurement(self.kind, sample.t_valid, sample.t_arrival, z, self._variances[: len(z)]),)
 
 
 class InertialFrontEnd:
@@ -25,7 +30,7 @@ class InertialFrontEnd:
 
     sensor = "inertial"
 
-    def process(self, sample: Sample, estimate: Estimate) -> tuple[Measurement, ...]:
+    def process(self, sample: Sample, estimate: Callable[[], Estimate]) -> tuple[Measurement, ...]:
         r: InertialReading = sample.data
         z = np.concatenate([r.euler, r.rates, r.v_N, r.moved_N])
         return (Measurement("inertial", sample.t_valid, sample.t_arrival, z, np.zeros(12)),)

@@ -9,8 +9,7 @@ Source     Brockers et al. 2012, section 3.3 (buffered inertial data, re-integra
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from landing_sim.interfaces import Estimator
 from landing_sim.signals import Command, Estimate, Measurement
@@ -18,8 +17,7 @@ from landing_sim.signals import Command, Estimate, Measurement
 EPS = 1e-9  # [s] two times closer than this are the same
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
+class Entry(NamedTuple):
     """One input and the memory after it: a prediction (command) or an update (measurement)."""
 
     t: float

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -60,30 +61,31 @@ class RunwayFrontEnd:
         self._names: tuple[str, ...] = ()
         self._sight_of: Array = np.empty((9, 0))
 
-    def process(self, sample: Sample, estimate: Estimate) -> tuple[Measurement, ...]:
-        """`estimate` at sample.t_valid.
+    def process(self, sample: Sample, estimate: Callable[[], Estimate]) -> tuple[Measurement, ...]:
+        """`estimate` answers for sample.t_valid.
 
         Raises ValueError for an estimate that is not finite or lacks one of x, y, H, phi, theta, psi.
         """
         data: CameraSample = sample.data
         pan, tilt = (data.pan, data.tilt) if self._encoder else (data.pan_cmd, data.tilt_cmd)
-        if not estimate.valid or estimate.flags.get("lost", False):
+        believed = estimate()
+        if not believed.valid or believed.flags.get("lost", False):
             got = self._acquisition.acquire(data, pan, tilt)
             self.reason = got.reason
             if got.z is None or got.R is None:
                 return ()
             return (Measurement("pose", sample.t_valid, sample.t_arrival, got.z, got.R),)
-        if estimate.names is not self._names:
-            self._names, self._sight_of = estimate.names, sight_of(estimate.names)
+        if believed.names is not self._names:
+            self._names, self._sight_of = believed.names, sight_of(believed.names)
         T = self._sight_of
-        sight = T @ estimate.mean
+        sight = T @ believed.mean
         sight[PAN] += pan
         sight[TILT] += tilt
         if sight[WIDTH] == 0.0:  # not among what is estimated
             sight[WIDTH] = self._width
         if not math.isfinite(sight.sum()):
-            raise ValueError(f"camera front end: the estimate at t = {estimate.t} s is not finite: {sight.tolist()}")
-        cov = self._unknown if estimate.cov is None else T @ estimate.cov @ T.T
+            raise ValueError(f"camera front end: the estimate at t = {believed.t} s is not finite: {sight.tolist()}")
+        cov = self._unknown if believed.cov is None else T @ believed.cov @ T.T
         w = self._planner.place(sight, cov, self._counts)
         z, variance, _, status = self._planner.measure(data.frame, w)
         edges = EdgeSet(w.feature, w.centre, w.direction, status, pan, tilt)

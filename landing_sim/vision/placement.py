@@ -127,13 +127,12 @@ def place(
     n = n_T + n_L + n_R + counts[HORIZON]
     F, I = F[:n], I[:n]
 
-    size, own = np.zeros(2, dtype=np.int64), np.zeros((n, 2), dtype=np.int64)
+    size = np.zeros(2, dtype=np.int64)
     for i in range(n):
         if I[i, STATUS] == OK:
             for c in range(2):
                 reach = (I[i, SEARCH] + REACH) * abs(F[i, STEP + c]) + I[i, HALF] * abs(F[i, ALONG + c])
-                own[i, c] = min(2 * math.ceil(reach) + 4, int(frame[c]))
-                size[c] = max(size[c], own[i, c])
+                size[c] = max(size[c], min(2 * math.ceil(reach) + 4, int(frame[c])))
     for i in range(n):
         if I[i, STATUS] == OK:
             c = 1 if F[i, ALONG] == 1.0 and abs(F[i, STEP + 1]) == 1.0 else 0
@@ -141,11 +140,12 @@ def place(
             F[i, OFFSET] += shift * math.hypot(F[i, STEP], F[i, STEP + 1])
             for k in range(2):
                 F[i, ORIGIN + k] = F[i, CENTRE + k] + shift * F[i, STEP + k]
-                middle = math.floor(F[i, ORIGIN + k]) + 1
-                corner = min(int(frame[k]) - size[k], max(0, middle - size[k] // 2))
+                low = math.floor(F[i, ORIGIN + k]) - size[k] // 2 + 1
+                corner = min(int(frame[k]) - size[k], max(0, low))
                 I[i, CORNER + k] = corner
-                I[i, LOOKED + k] = max(0, middle - own[i, k] // 2 - corner)
-                I[i, LOOKED + 2 + k] = min(size[k], middle - own[i, k] // 2 + own[i, k] - corner)
+                reach = (I[i, SEARCH] + REACH) * abs(F[i, STEP + k]) + I[i, HALF] * abs(F[i, ALONG + k]) + 1e-6
+                I[i, LOOKED + k] = max(0, math.floor(F[i, ORIGIN + k] - reach) - corner)
+                I[i, LOOKED + 2 + k] = min(size[k], math.floor(F[i, ORIGIN + k] + reach) + 2 - corner)
     return F, I, size[0], size[1]
 
 
