@@ -14,6 +14,8 @@ import numpy as np
 
 from landing_sim.types import Array
 
+BLOCK = 64  # normals drawn at once
+
 
 class NoiseStream(Protocol):
     """Standard normals for one named component."""
@@ -35,15 +37,21 @@ class Noise:
     run : index of the run within a campaign
     """
 
-    __slots__ = ("_generator", "_key")
+    __slots__ = ("_at", "_drawn", "_generator", "_key")
 
     def __init__(self, seed: int, name: str, run: int = 0) -> None:
         sequence = np.random.SeedSequence(seed, spawn_key=(run, zlib.crc32(name.encode())))
         self._key = int(sequence.generate_state(1, np.uint64)[0])
         self._generator = np.random.Generator(np.random.Philox(sequence))
+        self._drawn, self._at = np.empty(0), 0
 
     def normal(self, size: int) -> Array:
-        return self._generator.standard_normal(size)
+        at, end = self._at, self._at + size
+        if end > len(self._drawn):  # the same numbers as drawn one by one, but a call to the generator for many
+            more = self._generator.standard_normal(max(BLOCK, size))
+            self._drawn, at, end = np.concatenate([self._drawn[at:], more]), 0, size
+        self._at = end
+        return self._drawn[at:end]
 
     def key(self) -> int:
         return self._key
