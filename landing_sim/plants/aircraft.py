@@ -88,16 +88,19 @@ class JsbsimPlant:
         self._platform = platform
         self._start_angles = (platform.pan, platform.tilt) if platform is not None else (0.0, 0.0)
         self._p_BC = np.zeros(3) if p_BC is None else np.array(p_BC, dtype=float)
-        self.reset()
+        self._begin()
 
     # ------------------------------------------------------------------------------------------ beginning
 
     def reset(self) -> Truth:
-        """A fresh flight model at the initial state; the same bits every time. Raises PlantError."""
+        """Back to the initial state in a fresh flight model; the same bits every time. Raises PlantError."""
+        if self._tick > 0:
+            self._begin()
+        return self.truth()
+
+    def _begin(self) -> None:
         s = self._initial
-        self._model = model = FlightModel(
-            self._folder, self.dt, s.mass, np.array(s.cg_offset_B), s.temperature_offset
-        )
+        self._model = model = FlightModel(self._folder, self.dt, s.mass, np.array(s.cg_offset_B), s.temperature_offset)
         self._contacts = read_contacts(self._folder / f"{self._folder.name}.xml", model.nominal_cg)
         n = len(self._contacts.names)
         self._height, self._bristle, self._pushing = np.full(n, math.inf), np.zeros((n, 2)), False
@@ -122,7 +125,6 @@ class JsbsimPlant:
         self._wind_N = motion.into_N(self._body, *self._wind_R0)
         model.release(self._wind_N)
         self._write(self.trimmed)
-        return self.truth()
 
     def _fly(self) -> tuple[TrimPoint, Array, float, Array]:
         s = self._initial
@@ -176,8 +178,8 @@ class JsbsimPlant:
         self._wind_N = motion.into_N(self._body, *wind_R)
         for write, value in zip(model.set_wind_fps, self._wind_N):
             write(value / FT)
-        model.run()
         self._tick += 1
+        model.run()
         rates = self._settle(command)
         if self._platform is not None:
             self._platform.step(command.pan, command.tilt, rates, self.dt)

@@ -270,11 +270,8 @@ class LogBuilder:
 
     def _covariances(self, m: int) -> Array:
         """(n, m, m), NaN where the estimate has none."""
-        cov = np.full((len(self._estimate), m, m), np.nan)
-        known = [k for k, estimate in enumerate(self._estimate) if estimate.cov is not None]
-        if known:
-            cov[known] = np.concatenate([self._estimate[k].cov for k in known]).reshape(-1, m, m)
-        return cov
+        nothing = np.full((m, m), np.nan)
+        return np.concatenate([nothing if e.cov is None else e.cov for e in self._estimate]).reshape(-1, m, m)
 
     def _windows(self, n: int) -> dict[str, np.ndarray]:
         m = max((len(z) for _, _, z, _ in self._edges), default=0)
@@ -315,13 +312,13 @@ class LogBuilder:
 def _nees(log: FlightLog, names: tuple[str, ...], cov: Array) -> tuple[Array, np.ndarray]:
     """Squared error normalised by the covariance, over the rigid-body states the filter has; divide by its dof."""
     known = [name for name in RIGID if name in names]
-    index = [names.index(name) for name in known]
+    index = np.array([names.index(name) for name in known], np.int64)
     dof = np.full(len(log), len(index), np.int64)
     nees = np.full(len(log), np.nan)
-    if index:
+    if len(index):
         error = np.column_stack([log.error(name) for name in known])
         use = np.flatnonzero(np.isfinite(error).all(axis=1))
-        e, P = error[use], cov[use][:, index][:, :, index]
+        e, P = error[use], cov[np.ix_(use, index, index)]
         try:
             nees[use] = np.einsum("ni,ni->n", e, np.linalg.solve(P, e[:, :, None])[:, :, 0])
         except np.linalg.LinAlgError:  # a state pinned by the filter has no variance: no number for such rows
