@@ -207,6 +207,7 @@ def list_() -> None:
 
 
 app.command()(commands.campaign)
+app.command()(commands.report)
 app.command()(commands.export)
 
 

@@ -22,21 +22,40 @@ SHORT = ("--set", "time.limit_s=1.2")  # a flight that ends before anything has 
 
 def cli(*arguments: str, cwd: Path, **env: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [str(PROGRAM), *arguments], cwd=cwd, env=os.environ | env, capture_output=True, text=True, timeout=300, check=False
+        [str(PROGRAM), *arguments],
+        cwd=cwd,
+        env=os.environ | env,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
     )
 
 
 def test_help_lists_the_commands_and_exit_codes(tmp_path: Path) -> None:
     result = cli("--help", cwd=tmp_path)
     assert result.returncode == 0
-    for word in ("run", "replay", "reproduce", "design", "check", "schema", "doctor", "list", "130 interrupted"):
+    commands = (
+        "run",
+        "campaign",
+        "replay",
+        "report",
+        "export",
+        "reproduce",
+        "design",
+        "check",
+        "schema",
+        "doctor",
+        "list",
+    )
+    for word in (*commands, "4 partial campaign", "130 interrupted"):
         assert word in result.stdout
-    assert "campaign" not in result.stdout
     assert cli(cwd=tmp_path).returncode == 2
 
 
 @pytest.mark.parametrize(
-    "arguments", [("fly",), ("run",), ("run", "do128/gust", "--bogus"), ("run", "do128/gust", "--seed", "-1"), ("design",)]
+    "arguments",
+    [("fly",), ("run",), ("run", "do128/gust", "--bogus"), ("run", "do128/gust", "--seed", "-1"), ("design",)],
 )
 def test_usage_errors_exit_2(arguments: tuple[str, ...], tmp_path: Path) -> None:
     result = cli(*arguments, cwd=tmp_path)
@@ -63,7 +82,10 @@ def test_bad_scenarios_exit_2_and_write_nothing(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("run", "do128/gusty"), "do128/gusty:1:1: (file): no such file or shipped scenario (did you mean 'do128/gust'?)"),
+        (
+            ("run", "do128/gusty"),
+            "do128/gusty:1:1: (file): no such file or shipped scenario (did you mean 'do128/gust'?)",
+        ),
         (("run", "do128/gust", "--set", "seed=x"), "--set seed: seed: must be a valid integer, not 'x'"),
         (("run", "do128/gust", "--seed", str(2**63)), "--set seed: seed: must be less than"),
         (("run", "do128/gust", "--out", "/proc/nope"), "--out /proc/nope: (file): cannot be made: "),

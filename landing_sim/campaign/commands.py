@@ -39,12 +39,12 @@ def campaign(
     plan = load(file, runs)
     folder = out or Path("out") / plan.campaign.name
     from landing_sim import progress
-    from landing_sim.campaign import run, sheet, store
+    from landing_sim.campaign import rare_landings, run, sheet, store
 
     with progress.campaign_shown(plan.campaign.name, plan.campaign.runs) as watch:
         aside = run.fly(plan, folder, workers, cluster, watch=watch)
     results = store.read(folder)
-    found = sheet.sheet(results, folder)
+    found = sheet.sheet(results, folder, rare_landings.saved(folder, plan))
     if json_:
         typer.echo(json.dumps(found, allow_nan=False))
     else:
@@ -55,6 +55,15 @@ def campaign(
         typer.echo(f"{len(aside)} landings are missing; the same command tries them again", err=True)
         raise typer.Exit(PARTIAL)
     raise typer.Exit(PASSED if found["passed"] else FAILED)
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder that `campaign` wrote.")],
+) -> None:
+    """Write DIR/report.html: verdict, footprint, tails, worst landings, sensitivity, on one page."""
+    from landing_sim.campaign.report import report as write
+
+    typer.echo(str(write(folder)))
 
 
 def export(
