@@ -292,12 +292,17 @@ def record_other(stream: rr.RecordingStream, log: FlightLog) -> None:
 
 
 def _blueprint(scene: Scene) -> Any:
+    import rerun as rr
     import rerun.blueprint as rrb
+
+    # the whole flight, also where it is longer than the half minute either way that the viewer would show of it
+    always = rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
+    whole = rrb.TimeAxis(view_range=always)
 
     def plot(entity: str, title: str, span: tuple[float, float] | None = None) -> Any:
         axis = None if span is None else rrb.ScalarAxis(range=span)
         return rrb.TimeSeriesView(
-            origin=entity, name=title, axis_y=axis, plot_legend=rrb.PlotLegend(visible=span is None)
+            origin=entity, name=title, axis_x=whole, axis_y=axis, plot_legend=rrb.PlotLegend(visible=span is None)
         )
 
     x, y, z = scene.start
@@ -349,7 +354,7 @@ def _mesh(mesh: shapes.Mesh, colour: overlay.Colour) -> Any:
 def _jpeg(pixels: np.ndarray) -> bytes:
     import cv2
 
-    ok, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, 85])
+    ok, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, 75])
     if not ok:
         raise ReplayError(f"cannot encode an image of shape {pixels.shape}")
     return bytes(data)
