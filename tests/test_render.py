@@ -187,12 +187,16 @@ def test_interiors_agree_with_a_ray_caster(view: CameraTruth, slope: float) -> N
 
 
 @pytest.mark.parametrize(
-    "view",
-    [pose(-300.0, 2.0, 17.0, 0.05), pose(-60.0, 1.0, 5.0), pose(100.0, 0.5, 2.0, -0.03), pose(-950.0, -10.0, 51.0)],
-    ids=["300 m", "60 m", "over the runway", "950 m"],
-)
-def test_grey_levels_agree_with_a_supersampled_ray_caster(view: CameraTruth) -> None:
-    """Thin stripes keep their contrast: the exact picture against 256 rays a pixel, blurred by brute force."""
+    ("view", "most"),
+    [(pose(-300.0, 2.0, 17.0, 0.05), 2.5), (pose(-60.0, 1.0, 5.0), 6.0), (pose(100.0, 0.5, 2.0, -0.03), 6.0),
+     (pose(-950.0, -10.0, 51.0), 2.5), (pose(-3000.0, 5.0, 157.0, theta=-0.052), 2.0)],
+    ids=["300 m", "60 m", "over the runway", "950 m", "3 km"],
+)  # fmt: skip
+def test_grey_levels_agree_with_a_supersampled_ray_caster(view: CameraTruth, most: float) -> None:
+    """Thin stripes keep their contrast, and edges show through paint that is blurred over them.
+
+    The exact picture against 256 rays a pixel, blurred by brute force.
+    """
     import cv2
 
     runway, over = Runway(), 16
@@ -205,7 +209,7 @@ def test_grey_levels_agree_with_a_supersampled_ray_caster(view: CameraTruth) -> 
     assert np.ptp(expected) > 50.0
     assert abs(error.mean()) < 0.1
     assert np.sqrt(np.mean(error**2)) < 0.8
-    assert np.abs(error).max() < 10.0
+    assert np.abs(error).max() < most
 
 
 # ------------------------------------------------------------------------------------ windows, frames, determinism

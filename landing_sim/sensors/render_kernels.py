@@ -35,7 +35,7 @@ TILE = 32  # [px] side of the blocks a full frame is made of
 FAR = 1 << 20  # [px] outside every image
 CULL_MARGIN = 64.0  # [px] around the image outside which a quadrilateral is dropped
 
-SKY, GRASS = 0, 1  # as in world.runway
+SKY, GRASS, SURFACE, PAINT = 0, 1, 2, 3  # as in world.runway
 
 
 def edge_table() -> Array:
@@ -232,9 +232,13 @@ def _draw_horizon(
 
 @kernel
 def _draw_quad(
-    block: Array, w: int, h: int, u0: int, v0: int, line: Array, box: np.ndarray, mask: int, grey: float, table: Array
-) -> None:
+    block: Array, w: int, h: int, u0: int, v0: int, line: Array, box: np.ndarray, mask: int, grey: float, below: float,
+    table: Array,
+) -> None:  # fmt: skip
     """Compose one quadrilateral over a block; edges outside `mask` are known to be far inside.
+
+    below >= 0 is the grey of what it is painted on: it replaces that, alpha (grey - below) is added. A lens blurs light,
+    which adds up, so an edge of what is below shows through paint that is blurred over it. below < 0: it covers all.
 
     In each row, columns lo..hi are not wholly beyond an edge (one pixel generous), columns inside_lo..inside_hi wholly
     inside all (one pixel stingy): elsewhere alpha is exactly 0 or 1.
@@ -274,7 +278,7 @@ def _draw_quad(
         if inside_lo >= inside_hi:
             inside_lo = inside_hi = hi
         for c in range(inside_lo, inside_hi):
-            block[r, c] = grey
+            block[r, c] = grey if below < 0.0 else block[r, c] + (grey - below)
         start, stop = lo, inside_lo
         for _ in range(2):
             for c in range(start, stop):
@@ -289,7 +293,7 @@ def _draw_quad(
                     weight = (q0 * (q1 * w01 + q3 * w30) + q2 * (q1 * w12 + q3 * w23)) / both
                     bound = min(across, along) if weight > 0.0 else max(0.0, across + along - 1.0)
                     alpha += abs(weight) * (bound - alpha)
-                block[r, c] = alpha * grey + (1.0 - alpha) * block[r, c]
+                block[r, c] += alpha * (grey - (block[r, c] if below < 0.0 else below))
             start, stop = inside_hi, hi
 
 
@@ -345,7 +349,8 @@ def shade(
             for j in range(first[k], counts[k]):
                 m = active[k, j]
                 grey = palette[seen[k, m, 0]]
-                _draw_quad(block, bw, bh, u0, v0, lines[k, m], seen[k, m], edges[k, j], grey, table)
+                below = palette[SURFACE] if seen[k, m, 0] == PAINT else -1.0
+                _draw_quad(block, bw, bh, u0, v0, lines[k, m], seen[k, m], edges[k, j], grey, below, table)
             if subs > 1:
                 for r in range(bh):
                     for c in range(bw):
