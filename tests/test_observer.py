@@ -17,7 +17,7 @@ from landing_sim.estimators.observer.gibert import Gibert, GibertConfig, correct
 from landing_sim.estimators.observer.kinematic_ekf import EkfConfig, KinematicEkf
 from landing_sim.estimators.observer.looking import Image
 from landing_sim.estimators.observer.runway_observer import NAMES, ObserverConfig, RunwayObserver
-from landing_sim.estimators.observer.scene import Scene, carriage
+from landing_sim.estimators.observer.scene import Carriage, Scene, carriage
 from landing_sim.estimators.rewind import Rewind
 from landing_sim.geometry.earth import level_at
 from landing_sim.geometry.pinhole import Intrinsics
@@ -245,6 +245,23 @@ def test_the_runways_width_ranges_on_the_glide_path(make: object) -> None:
     for after, rms in ((10.0, 0.15), (20.0, 0.04), (30.0, 0.02), (60.0, 0.005)):
         errors = [run[np.searchsorted(run[:, 0], after), 1] for run in runs]
         assert math.sqrt(np.mean(np.square(errors))) <= rms, after
+
+
+def test_what_the_velocity_is_wrong_by_across_the_way_is_found() -> None:
+    """A unit that drifts 0.4 m/s to the right and 0.3 down."""
+    g, wrong, last, scene = Gibert(GibertConfig(outputs="width"), LENS), np.array([0.0, 0.4, 0.3]), None, None
+    R_RB = from_euler(0.0, 0.07, 0.0)
+    for t, p, v in glide():
+        z = reading(v + wrong, p * 0.0 if last is None else p - last + wrong * DT)
+        if scene is None:
+            scene = g.start(scene_at(p, 45.0), start_covariance(), t)
+        else:
+            scene = g.move(scene, z[9:12], DT)
+        scene = g.look(scene, Image(t, edges_of(p, R_RB, 45.0), z), Carriage(R_RB, v + wrong - scene.s[sc.BX :]))
+        last = p
+    assert scene is not None and last is not None
+    np.testing.assert_allclose(scene.s[sc.BX :], [0.0, 0.4, 0.3], atol=0.02)
+    assert abs(scene.s[sc.Y] - last[1]) < 0.02 and abs(scene.s[sc.H] + last[2]) < 0.3
 
 
 def test_the_aim_points_bearing_alone_does_not_range_on_the_glide_path() -> None:

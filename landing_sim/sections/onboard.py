@@ -60,7 +60,7 @@ class Observer(Section):
     first_range_m: Positive | None = Field(
         None, description="first guess of the range to the threshold; null = what a runway 45 m wide would be at"
     )
-    bandwidth_rps: float = Field(0.5, gt=0, le=5, description="of the range at first, gibert; it falls to half")
+    bandwidth_rps: float = Field(0.6, gt=0, le=5, description="of the range at first, gibert; it falls to 0.7 of that")
     attitude: Literal["inertial", "horizon"] = Field("inertial", description="where roll and pitch come from")
     trust_percent: float = Field(
         10.0, gt=0, le=100, description="the range steers nothing before its error bound has come below this"

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from landing_sim.estimators.line_fit import CENTRE, COV, USED, cross_rows, fit_r
 from landing_sim.estimators.lines import LineConfig
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.geometry.runway_image import HORIZON, LEFT, RIGHT, THRESHOLD, horizon_dip
-from landing_sim.geometry.so3 import camera_from_body, from_euler, product, to_euler, turned
+from landing_sim.geometry.so3 import camera_from_body, product, to_euler, turned
 from landing_sim.geometry.vanishing import down_of
 from landing_sim.jit import kernel
 from landing_sim.signals import EdgeSet
@@ -37,7 +37,7 @@ class Bearings:
     """Of one image; None what it does not show."""
 
     turned: tuple[Array, Array] | None  # (2,) [rad] runway's heading less the believed, vanishing point's rise; (2, 2)
-    pitched: float | None  # [rad] pitch less that of the horizon, whose dip is taken for that from `height`
+    level: tuple[float, float] | None  # [rad] roll, pitch believed less the horizon's, whose dip is that from `height`
     threshold: tuple[Array, Array] | None  # y1, y2, s and their variances (3,), (3,)
     borders: tuple[Array, Array] | None  # k of the left and right border and their variances (2,), (2,)
 
@@ -50,20 +50,18 @@ def bearings(
     R_RB: Array,
     camera_error: tuple[float, float],
     height: float,
-    attitude: Literal["inertial", "horizon"] = "inertial",
 ) -> Bearings:
     """From the edges of an image (measurement "edges": z, R, geometry).
 
     R_RB (3, 3): attitude as believed; camera_error [rad]: of the pan and tilt read; height [m] of the camera, for the dip.
-    "horizon" takes roll and pitch from the image, where it shows the horizon, and "inertial" from R_RB.
     """
     seen = see(
         z, R, edges.feature, edges.status, edges.centre, edges.direction, edges.pan - camera_error[0],
-        edges.tilt - camera_error[1], np.array([lens.f, lens.cx, lens.cy]), R_RB, height, attitude == "horizon",
+        edges.tilt - camera_error[1], np.array([lens.f, lens.cx, lens.cy]), R_RB, height,
     )  # fmt: skip
     return Bearings(
         None if math.isnan(seen.turned[0]) else (seen.turned, seen.turned_cov),
-        None if math.isnan(seen.pitched) else seen.pitched,
+        None if math.isnan(seen.level[0]) else seen.level,
         None if math.isnan(seen.y[0]) else (seen.y, seen.y_var),
         None if math.isnan(seen.k[0]) else (seen.k, seen.k_var),
     )
@@ -74,7 +72,7 @@ class Seen(NamedTuple):
 
     turned: Array
     turned_cov: Array
-    pitched: float
+    level: tuple[float, float]
     y: Array
     y_var: Array
     k: Array
@@ -84,31 +82,27 @@ class Seen(NamedTuple):
 @kernel
 def see(
     z: Array, R: Array, feature: np.ndarray, status: np.ndarray, centre: Array, direction: Array, pan: float, tilt: float,
-    lens: Array, R_RB: Array, height: float, by_horizon: bool,
+    lens: Array, R_RB: Array, height: float,
 ) -> Seen:  # fmt: skip
     """`bearings` of edges seen by a camera at pan and tilt [rad] as they are believed to be; lens (3,) f, cx, cy."""
-    seen = Seen(
-        np.full(2, np.nan), np.full((2, 2), np.nan), np.nan, np.full(3, np.nan), np.full(3, np.nan), np.full(2, np.nan),
-        np.full(2, np.nan),
-    )  # fmt: skip
+    directions, directions_cov = np.full(2, np.nan), np.full((2, 2), np.nan)
+    y, y_var, k, k_var = np.full(3, np.nan), np.full(3, np.nan), np.full(2, np.nan), np.full(2, np.nan)
     R_BC = camera_from_body(pan, tilt).T.copy()
     level = _level_threshold(feature, status, centre, product(R_RB, R_BC), lens)
     rows = fit_rows(z, R, feature, status, centre, direction, lens, horizon_dip(height), level, _MIN_BASELINE, _LIMIT)
-    pitched = math.nan
+    off = (math.nan, math.nan)
     horizon = rows[HORIZON]
     if horizon[USED] > 0.0:
         c = -(horizon[0] * horizon[CENTRE] + horizon[1] * horizon[CENTRE + 1])
         down = down_of(horizon[0], horizon[1], c, lens[0], lens[1], lens[2])
         down = turned(R_BC, down[0], down[1], down[2])
-        theta = math.asin(min(1.0, max(-1.0, -down[0])))
-        if by_horizon:
-            R_RB = from_euler(math.atan2(down[1], down[2]), theta, to_euler(R_RB)[2])
-        pitched = to_euler(R_RB)[1] - theta
+        phi, theta, _ = to_euler(R_RB)
+        off = phi - math.atan2(down[1], down[2]), theta - math.asin(min(1.0, max(-1.0, -down[0])))
     R_RC = product(R_RB, R_BC)
-    _see_vanishing(rows, R_RC, lens, seen.turned, seen.turned_cov)
-    _see_threshold(rows, R_RC, lens, seen.y, seen.y_var)
-    _see_borders(rows, R_RC, lens, seen.k, seen.k_var)
-    return Seen(seen.turned, seen.turned_cov, pitched, seen.y, seen.y_var, seen.k, seen.k_var)
+    _see_vanishing(rows, R_RC, lens, directions, directions_cov)
+    _see_threshold(rows, R_RC, lens, y, y_var)
+    _see_borders(rows, R_RC, lens, k, k_var)
+    return Seen(directions, directions_cov, off, y, y_var, k, k_var)
 
 
 @kernel

@@ -8,10 +8,15 @@ With rho = 1 / X of the threshold ahead of the camera and the outputs y1, y2 (be
 On the glide path the aim point's d1 = d2 = 0: no observer can range it. The runway's width keeps d_s = v1 s > 0.
 Where all d are small against eps the range is carried by the inertial velocity alone.
 
+Across the way the place is seen and its rate is told: what the two steadily disagree by is an error of the velocity
+(of the unit, or of the course, which a camera bolted on askew turns), and is integrated out of it,
+
+    b += l_b X e_i     (i = 1, 2; faded while the range is uncertain, since a wrong scale disagrees likewise)
+
 Source     Gibert et al. 2015, eqs. (7)-(13). Departs: its inverse of dPsi/dx (a division by d1) is replaced by the
-           smooth form; the third output and its unknown width are ours; discrete gains that are exact for a held
-           measurement. When the threshold has left the image, height and offset follow from the borders and the width
-           found so far.
+           smooth form; the third output and its unknown width, and the velocity's error, are ours; discrete gains that
+           are exact for a held measurement. When the threshold has left the image, height and offset follow from the
+           borders and the width found so far.
 """
 
 from __future__ import annotations
@@ -39,18 +44,22 @@ RAD = math.pi / 180.0
 
 @dataclass(frozen=True, slots=True)
 class GibertConfig:
-    """bandwidth [rad/s] of the range at first, a double pole; bearing_rate [1/s] of the bearings; eps [m/s] of angular
+    """attitude: "horizon" believes the horizon's roll and pitch and takes only their changes from the inertial unit;
+    bandwidth [rad/s] of the range at first, a double pole; bearing_rate [1/s] of the bearings; eps [m/s] of angular
     motion below which the range is carried; velocity_sigma [m/s] believed of the inertial unit; first_spread: relative, of
     the first guess. The error is believed to fall at half the bandwidth, since a double pole's begins slowly."""
 
     outputs: Literal["both", "width", "point"] = "both"
     attitude: Literal["inertial", "horizon"] = "inertial"
-    bandwidth: float = 0.5
+    bandwidth: float = 0.6
     later: float = 0.7  # share of the bandwidth that is left when the first guess has been forgotten
     hurry: float = 10.0  # [s] in which it falls to that
     bearing_rate: float = 2.0
+    bias_rate: float = 0.08  # [1/s] at which the velocity's error across the way is found
+    bias_limit: float = 2.0  # [m/s]
+    bias_spread: float = 0.02  # of the range, from which its error rather than the velocity's is taken for the cause
     eps: float = 0.1
-    floor: float = 10.0  # [m/s] of bearings: what moves slower than this is drowned in the velocity's error over d
+    floor: float = 25.0  # [m/s] of bearings: what moves slower than this is drowned in the velocity's error over d
     limit: float = 0.02  # largest share of the range that one image may correct
     velocity_sigma: float = 0.3
     bearing_floor: float = 2e-4  # [rad] common to all windows of an image: attitude
@@ -72,8 +81,8 @@ class Gibert:
         )
         c = config
         self._rule = Rule(
-            c.bandwidth, c.later, c.hurry, c.bearing_rate, c.eps, c.floor, c.limit, c.velocity_sigma, c.bearing_floor,
-            c.images, c.course_drift, c.tilt_drift, c.least_range,
+            c.bandwidth, c.later, c.hurry, c.bearing_rate, c.bias_rate, c.bias_limit, c.bias_spread, c.eps, c.floor,
+            c.limit, c.velocity_sigma, c.bearing_floor, c.images, c.course_drift, c.tilt_drift, c.least_range,
         )  # fmt: skip
 
     def start(self, s: Array, P: Array, t: float) -> Scene:
@@ -118,6 +127,9 @@ class Rule(NamedTuple):
     later: float
     hurry: float
     bearing_rate: float
+    bias_rate: float
+    bias_limit: float
+    bias_spread: float
     eps: float
     floor: float
     limit: float
@@ -155,23 +167,30 @@ def _look(
     ahead = np.array([-s[sc.X], -s[sc.Y], s[sc.H]])  # from the camera to the threshold's middle, R
     if s[sc.EROLL] != 0.0:
         R_RB = product(R_RB, from_euler(s[sc.EROLL], 0.0, 0.0))
-    seen = see(
-        z, R, feature, status, centre, direction, pan - s[sc.EPAN], tilt - s[sc.ETILT], lens, R_RB, ahead[2], by_horizon
-    )
+    seen = see(z, R, feature, status, centre, direction, pan - s[sc.EPAN], tilt - s[sc.ETILT], lens, R_RB, ahead[2])
     borders, threshold = not math.isnan(seen.k[0]), not math.isnan(seen.y[0])
     if not (borders or threshold) and math.isnan(seen.turned[0]):
         return s, P, spread, d, False, False
-    turn = _course(s, P, seen, 0.5 * spread * horizon_dip(ahead[2]), c)
+    dt = min(max(dt, 1e-3), 0.5)
+    fast = 1.0 - math.exp(-c.bearing_rate * dt)
+    dip = 0.5 * spread * horizon_dip(ahead[2])  # how far it may be wrong
+    if by_horizon and not math.isnan(seen.level[0]):
+        s[sc.EROLL] -= fast * seen.level[0]
+        dip = 0.0
+    turn = _course(s, P, seen, dip, c)
     cos, sin = math.cos(turn), math.sin(turn)  # into axes turned to the right by as much
     ahead[0], ahead[1] = cos * ahead[0] + sin * ahead[1], cos * ahead[1] - sin * ahead[0]
-    dt = min(max(dt, 1e-3), 0.5)
+    right, below = ahead[1], ahead[2]
     in_view = threshold and ahead[0] > 0.0
     if in_view:
         y, along = seen.y, cos + seen.y[0] * sin
         y[0], y[1], y[2] = (y[0] * cos - sin) / along, y[1] / along, y[2] / along**2
+        right, below = y[0] * ahead[0] - right, y[1] * ahead[0] - below
         s[sc.WIDTH], d, spread = correct_range(ahead, s[sc.WIDTH], y, seen.y_var, v_R, spread, dt, since, use, c)
+        _learn(s, right, below, spread, dt, c)
     elif borders:
-        _borders(ahead, s[sc.WIDTH], seen.k, seen.k_var, 1.0 - math.exp(-c.bearing_rate * dt))
+        _borders(ahead, s[sc.WIDTH], seen.k, seen.k_var, fast)
+        _learn(s, (ahead[1] - right) / fast, (ahead[2] - below) / fast, 0.0, dt, c)
     s[sc.X], s[sc.Y], s[sc.H] = -ahead[0], -ahead[1], ahead[2]
     _cover(s, P, spread)
     return s, P, spread, d, True, in_view
@@ -186,9 +205,9 @@ def _course(s: Array, P: Array, seen: Seen, dip: float, c: Rule) -> float:
     """
     a, b, e = P[sc.COURSE, sc.COURSE], P[sc.COURSE, sc.ETILT], P[sc.ETILT, sc.ETILT]
     course = tilt = 0.0
-    if not math.isnan(seen.pitched):
+    if not math.isnan(seen.level[1]):
         below = e + c.images * (dip**2 + c.bearing_floor**2)
-        course, tilt = b / below * seen.pitched, e / below * seen.pitched
+        course, tilt = b / below * seen.level[1], e / below * seen.level[1]
         a, b, e = a - b * b / below, b - b * e / below, e - e * e / below
     if not math.isnan(seen.turned[0]):
         floor, cov = c.bearing_floor**2, seen.turned_cov
@@ -243,6 +262,17 @@ def _borders(ahead: Array, width: float, k: Array, var: Array, gain: float) -> N
     if abs(Z - ahead[2]) <= 2.0 + 4.0 * sigma + 0.2 * Z:
         ahead[1] += gain * (0.5 * (k[0] + k[1]) * Z - ahead[1])
         ahead[2] += gain * (Z - ahead[2])
+
+
+@kernel
+def _learn(s: Array, right: float, below: float, spread: float, dt: float, c: Rule) -> None:
+    """The velocity's error across the way, from how far the runway is `right` of and `below` where it was expected [m].
+
+    Before the place is corrected; with bearing_rate far above bias_rate the poles are these two.
+    """
+    gain = c.bearing_rate * c.bias_rate * dt / (1.0 + (spread / c.bias_spread) ** 2)
+    s[sc.BY] = min(max(s[sc.BY] + gain * right, -c.bias_limit), c.bias_limit)
+    s[sc.BZ] = min(max(s[sc.BZ] + gain * below, -c.bias_limit), c.bias_limit)
 
 
 @kernel
