@@ -136,7 +136,7 @@ def test_verdict_follows_from_its_bounds(seed: int, shift: float, lost: int, exp
     values[:lost], outcome[:lost] = np.nan, "crash"
     row = judge(risk(10.0**-exponent), values, outcome)
     assert 0 <= row.lower95 <= row.upper95 <= 1
-    wanted = PASS if row.upper95 < row.limit else FAIL if row.lower95 > row.limit else OPEN
+    wanted = PASS if row.upper95 < row.probability else FAIL if row.lower95 > row.probability else OPEN
     assert row.verdict == wanted
     if row.method == "count":
         assert row.lower95 <= row.count / row.n <= row.upper95

@@ -74,13 +74,15 @@ def sensitivity(
     if n < max(FEWEST, 3 * len(columns)) or not columns or np.ptp(y) == 0.0:
         return None
     X = np.column_stack(list(columns.values()))
-    found, r_squared = _srrc(X, y)
-    index = first_order(X, y)
+    ranks, target, bins = rankdata(X, axis=0), rankdata(y), _bins(X, _bin_count(n))
+    found, r_squared = _regression(ranks, target)
+    index = _explained(bins, y)
     picks = (ndtr(Noise(seed, f"sensitivity {metric}").normal(resamples * n)) * n).astype(int).reshape(resamples, n)
     picks = np.minimum(picks, n - 1)
-    again = np.array([_srrc(X[pick], y[pick])[0] for pick in picks])
-    indices = np.array([first_order(X[pick], y[pick]) for pick in picks])
-    # a resample holds each landing several times, which looks like an effect to bins: centre on the sample's own
+    # ranks and bins stay those of the sample: of a resample, where landings stand several times, they would be others
+    again = np.array([_regression(ranks[pick], target[pick])[0] for pick in picks])
+    indices = np.array([_explained(bins[pick], y[pick]) for pick in picks])
+    # standing several times looks like an effect to bins: centred on the sample's own
     indices += index - indices.mean(axis=0)
     low, high = np.quantile(again, [0.025, 0.975], axis=0)
     index_low, index_high = np.clip(np.quantile(indices, [0.025, 0.975], axis=0), 0.0, 1.0)
@@ -100,34 +102,43 @@ def sensitivity(
     return Sensitivity(metric, n, r_squared, tuple(strength))
 
 
-def _srrc(X: Array, y: Array) -> tuple[Array, float]:
-    """Coefficients (k,) and R^2 of the standardised ranks."""
-    ranks, target = rankdata(X, axis=0), rankdata(y)
+def _regression(ranks: Array, target: Array) -> tuple[Array, float]:
+    """Coefficients (k,) of standardised ranks (n, k) for the target's, and R^2."""
     spread = ranks.std(axis=0)
     ranks = (ranks - ranks.mean(axis=0)) / np.where(spread > 0.0, spread, 1.0)
-    target = (target - target.mean()) / target.std()
-    coefficients, *_ = np.linalg.lstsq(ranks, target, rcond=None)
+    target = (target - target.mean()) / (target.std() or 1.0)
+    coefficients = np.asarray(np.linalg.lstsq(ranks.T @ ranks, ranks.T @ target, rcond=None)[0], np.float64)
     return coefficients, 1.0 - float(np.mean((target - ranks @ coefficients) ** 2))
 
 
 def first_order(X: Array, y: Array, bins: int | None = None) -> Array:
     """First-order Sobol indices (k,) of y (n,) to the columns of X (n, k), from any sample; may fall a little below 0."""
-    n = len(y)
-    m = bins or max(2, round(0.5 * math.sqrt(n)))
-    total = float(np.sum((y - y.mean()) ** 2))
-    return np.array([_explained(x, y, m, total) for x in X.T])
+    return _explained(_bins(X, bins or _bin_count(len(y))), y)
 
 
-def _explained(x: Array, y: Array, m: int, total: float) -> float:
+def _bin_count(n: int) -> int:
+    return max(2, round(0.5 * math.sqrt(n)))
+
+
+def _bins(X: Array, m: int) -> np.ndarray:
+    """(n, k) which of m equally filled bins; equal values share one: a word or a switch has as many bins as values."""
+    return np.minimum(((rankdata(X, method="min", axis=0) - 1.0) * m / len(X)).astype(int), m - 1)
+
+
+def _explained(bins: np.ndarray, y: Array) -> Array:
+    """(k,) share of y's variance that lies between the bins, less what chance alone puts there."""
+    n, m = len(y), int(bins.max()) + 1
+    centred = y - y.mean()
+    total = float(centred @ centred)
     if total == 0.0:
-        return 0.0
-    # ties fall into one bin: a word or a switch has as many bins as values
-    bin_of = np.minimum(((rankdata(x, method="min") - 1.0) * m / len(x)).astype(int), m - 1)
-    count = np.bincount(bin_of, minlength=m)
-    mean = np.bincount(bin_of, weights=y, minlength=m) / np.maximum(count, 1)
-    within = float(np.sum((y - mean[bin_of]) ** 2))
-    filled = int(np.count_nonzero(count))
-    return 1.0 - (len(y) - 1) / (len(y) - filled) * within / total
+        return np.zeros(bins.shape[1])
+    found = []
+    for column in bins.T:
+        count = np.bincount(column, minlength=m)
+        sums = np.bincount(column, weights=centred, minlength=m)
+        between = float(np.sum(sums**2 / np.maximum(count, 1)))
+        found.append(1.0 - (n - 1) / (n - np.count_nonzero(count)) * (1.0 - between / total))
+    return np.array(found)
 
 
 def strongest(

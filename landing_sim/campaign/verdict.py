@@ -58,13 +58,13 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """One row of the verdict sheet."""
+    """One row of the verdict sheet; a Risk itself."""
 
     name: str
     metric: str
     above: float | None
     below: float | None
-    limit: float  # the probability that must be undercut
+    probability: float  # that must be undercut
     count: int
     n: int
     go_arounds: int  # left out of n
@@ -141,7 +141,7 @@ def judge(risk: Risk, values: Array, outcome: np.ndarray, rare: Bounds | None = 
         metric=risk.metric,
         above=risk.above,
         below=risk.below,
-        limit=risk.probability,
+        probability=risk.probability,
         count=count,
         n=n,
         go_arounds=int((~counted).sum()),
@@ -206,7 +206,7 @@ def to_json(judged: Judged) -> dict[str, Any]:
     """A row as `campaign --json` prints it. `limit` is the probability; `above` and `below` are those of the metric."""
     return {
         "name": judged.name,
-        "limit": judged.limit,
+        "limit": judged.probability,
         "count": judged.count,
         "n": judged.n,
         "upper95": judged.upper95,

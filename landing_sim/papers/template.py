@@ -1,15 +1,8 @@
-"""The look of a paper's report."""
+"""The look of a paper's report, and of others on the same page style."""
 
 from __future__ import annotations
 
-TEMPLATE = """<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{{ paper.title }}</title>
-<style>
-:root { --ink: #1d2433; --soft: #5c677d; --line: #e3e7ee; --good: #2d6a4f; --bad: #b23a2e; --none: #6c757d; }
+CSS = """:root { --ink: #1d2433; --soft: #5c677d; --line: #e3e7ee; --good: #2d6a4f; --bad: #b23a2e; --none: #6c757d; }
 * { box-sizing: border-box; }
 body { margin: 0; background: #f4f6f9; color: var(--ink);
   font: 15px/1.5 system-ui, "Segoe UI", Helvetica, Arial, sans-serif; }
@@ -41,7 +34,19 @@ figure h3 span { color: var(--soft); font-weight: 400; }
 figure svg { width: 100%; height: auto; display: block; }
 figcaption { color: var(--soft); font-size: 13.5px; margin-top: 6px; max-width: 90ch; }
 code { font: 12.5px ui-monospace, Menlo, Consolas, monospace; }
-</style>
+"""
+
+TEMPLATE = (
+    """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{{ paper.title }}</title>
+<style>
+"""
+    + CSS
+    + """</style>
 </head>
 <body>
 <main>
@@ -96,3 +101,4 @@ code { font: 12.5px ui-monospace, Menlo, Consolas, monospace; }
 </body>
 </html>
 """
+)
