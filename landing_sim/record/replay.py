@@ -1,4 +1,4 @@
-"""Recordings for the rerun viewer. The only module that imports rerun, and only when it is used.
+"""Recordings for the rerun viewer; the stage they play on is stage.py. rerun is imported only when it is used.
 
 What is seen: the runway, the true and the estimated path and the aircraft with its camera in 3-D; the camera image with
 windows, measured and predicted edges; every error with its 3-sigma band; commands; flight phases and events.
@@ -17,8 +17,19 @@ import numpy as np
 
 from landing_sim.geometry.so3 import camera_from_body, from_euler
 from landing_sim.record import overlay, shapes
-from landing_sim.record.channels import ERRORS, MODE_COLOURS, RANGING, SERIES, SPANS, events
+from landing_sim.record.channels import ERRORS, RANGING, SERIES, events
 from landing_sim.record.log import FlightLog
+from landing_sim.record.stage import (
+    ESTIMATE_COLOUR,
+    IMAGE,
+    TIMELINE,
+    TRUE_COLOUR,
+    Scene,
+    blueprint,
+    draw,
+    mesh,
+    rerun,
+)
 from landing_sim.record.viewer import ReplayError, open_viewer, start_live_viewer
 from landing_sim.signals import Estimate, Measurement, Residuals, Step
 
@@ -27,29 +38,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Recorder", "ReplayError", "Scene", "events", "open_viewer", "record_log"]
 
-TIMELINE = "time"
-SIGHT = 30.0  # [m]
-TRUE_COLOUR, ESTIMATE_COLOUR, BAND_COLOUR = (60, 220, 120), (255, 170, 40), (150, 150, 165)
 OTHER_COLOUR = (120, 150, 255)
-IMAGE = "world/camera/image"
 TOGETHER = 32  # images sent at once
 FEATURES, STATUSES = overlay.packed(overlay.FEATURE_COLOURS), overlay.packed(overlay.STATUS_COLOURS)
-
-
-@dataclass(frozen=True, slots=True)
-class Scene:
-    """What stands still in a recording. The camera is the believed one: predicted edges are the filter's."""
-
-    camera: overlay.BelievedCamera
-    width: float  # [m] of the true runway
-    length: float
-    slope: float = 0.0  # [rad]
-    span: float = 15.6  # [m] of the aircraft
-    fuselage: float = 11.4
-    markings: bool = True
-    title: str = "landing-sim"
-    start: tuple[float, float, float] = (-950.0, -85.0, -51.0)  # [m] p_RB at t = 0: where the watching eye begins
-    ranged: bool = False  # the runway's size is not known on board
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +67,7 @@ class Recorder:
     """
 
     def __init__(self, path: Path, scene: Scene, frames_hz: float = 8.0, live: bool = False) -> None:
-        rr = _rerun()
+        rr = rerun()
         self._scene = scene
         self._period = 1.0 / frames_hz if frames_hz > 0.0 else np.inf
         self._next_frame = -np.inf
@@ -88,15 +79,15 @@ class Recorder:
         try:
             if live:
                 sinks = rr.GrpcSink(start_live_viewer()), rr.FileSink(str(path))
-                self._stream.set_sinks(*sinks, default_blueprint=_blueprint(scene))
+                self._stream.set_sinks(*sinks, default_blueprint=blueprint(scene))
             else:
-                self._stream.save(path, default_blueprint=_blueprint(scene))
+                self._stream.save(path, default_blueprint=blueprint(scene))
         except ReplayError:
             raise
         except Exception as error:
             raise ReplayError(f"cannot record to {path}: {error}") from error
         self._stream.send_recording_name(scene.title)
-        self._draw_world()
+        draw(self._stream, scene)
 
     def add(self, step: Step) -> None:
         """The camera image of this step, if it is time for one, with what was seen in it."""
@@ -126,7 +117,7 @@ class Recorder:
         record_log(self._stream, log)
         if other is not None:
             body = shapes.aircraft(self._scene.span, self._scene.fuselage)
-            self._stream.log("world/other/body", _mesh(body, OTHER_COLOUR), static=True)
+            self._stream.log("world/other/body", mesh(body, OTHER_COLOUR), static=True)
             record_other(self._stream, other)
         self._stream.flush()
         self._stream.disconnect()
@@ -134,7 +125,7 @@ class Recorder:
     def _send(self) -> None:
         """Images and what is drawn over them, in columns: a call a column costs as much as a call an image."""
         shots, self._shots = self._shots, []
-        rr = _rerun()
+        rr = rerun()
 
         def send(entity: str, which: Sequence[_Shot], columns: Any) -> None:
             self._stream.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=[s.t for s in which])], columns)
@@ -164,7 +155,7 @@ class Recorder:
             strips("measured", which, found, overlay.measured_edges(windows, z).ends)
 
     def _follow(self, step: Step) -> None:
-        rr, truth, stream = _rerun(), step.truth, self._stream
+        rr, truth, stream = rerun(), step.truth, self._stream
         stream.log("world/aircraft", rr.Transform3D(translation=truth.p_RB, mat3x3=truth.R_RB))
         stream.log("world/camera", rr.Transform3D(translation=step.camera.p_RC, mat3x3=step.camera.R_CR.T))
         if step.estimate.valid:
@@ -174,55 +165,10 @@ class Recorder:
             for entity, name, _, factor in ERRORS[:6]:
                 stream.log(entity, rr.Scalars([factor * (step.estimate[name] - float(true[name]))]))
 
-    def _draw_world(self) -> None:
-        rr, stream, scene = _rerun(), self._stream, self._scene
-        k = scene.camera.intrinsics
-        stream.log("world", rr.ViewCoordinates.FRD, static=True)
-        for entity in ("world/aircraft", "world/camera", IMAGE):
-            stream.log(entity, rr.TransformAxes3D(0.0), static=True)
-        half, length, slope = 0.5 * scene.width, scene.length, scene.slope
-        flat = [
-            ("grass", shapes.grass(scene.width, length, slope), (118, 148, 96)),
-            ("runway", [shapes.rectangle(0.0, length, -half, half, 0.0, slope)], (110, 112, 120)),
-        ]
-        if scene.markings:
-            flat.append(("markings", shapes.markings(scene.width, length, slope, 0.6), (240, 240, 240)))
-        for name, polygons, colour in flat:
-            stream.log(f"world/{name}", _mesh(shapes.polygons(polygons), colour), static=True)
-        body = shapes.aircraft(scene.span, scene.fuselage)
-        stream.log("world/aircraft/body", _mesh(body, (235, 238, 245)), static=True)
-        # The viewer's eye keeps a distance that suits the size of what it follows: specks that make it stand back.
-        specks = rr.Points3D([(-SIGHT, 0.0, 0.0), (SIGHT, 0.0, 0.0)], radii=0.01, colors=(235, 238, 245))
-        stream.log("world/aircraft/sight", specks, static=True)
-        pinhole = rr.Pinhole(
-            image_from_camera=k.K,
-            width=k.width,
-            height=k.height,
-            camera_xyz=rr.ViewCoordinates.RDF,
-            image_plane_distance=60.0,
-            color=(255, 255, 255, 90),
-        )
-        stream.log(IMAGE, pinhole, static=True)
-        stream.log(IMAGE, rr.EncodedImage.from_fields(media_type="image/jpeg"), static=True)
-        for drawn, order, radius in (("predicted", 10.0, 0.8), ("windows", 20.0, 0.5), ("measured", 30.0, 1.2)):
-            stream.log(f"{IMAGE}/{drawn}", rr.LineStrips2D.from_fields(draw_order=order, radii=radius), static=True)
-        stream.log(f"{IMAGE}/measured", rr.LineStrips2D.from_fields(colors=(255, 255, 0)), static=True)
-        for entity, *_ in ERRORS:
-            names = ["error", "+3 sigma", "-3 sigma"]
-            style = rr.SeriesLines(
-                colors=[ESTIMATE_COLOUR, BAND_COLOUR, BAND_COLOUR], names=names, widths=[2.0, 1.0, 1.0]
-            )
-            stream.log(entity, style, static=True)
-        for entity, _, series in SERIES + RANGING * scene.ranged:
-            stream.log(entity, rr.SeriesLines(names=[name for _, name, _ in series]), static=True)
-        labels = list(MODE_COLOURS)
-        modes = rr.StateConfiguration(values=labels, labels=labels, colors=[MODE_COLOURS[m] for m in labels])
-        stream.log("flight/phase", modes, static=True)
-
 
 def record_log(stream: rr.RecordingStream, log: FlightLog) -> None:
     """Paths, poses, series and events of a finished flight into an open recording."""
-    rr = _rerun()
+    rr = rerun()
     t = log["t_s"]
 
     def times(which: Any) -> list[Any]:
@@ -275,7 +221,7 @@ def record_log(stream: rr.RecordingStream, log: FlightLog) -> None:
 
 def record_other(stream: rr.RecordingStream, log: FlightLog) -> None:
     """Path, pose and series of a flight that another one is compared with; its series stand beside that one's."""
-    rr = _rerun()
+    rr = rerun()
     times = [rr.TimeColumn(TIMELINE, duration=log["t_s"])]
     p = np.column_stack([log["true_x_m"], log["true_y_m"], log["true_z_m"]])
     R_RB = [from_euler(*e) for e in zip(log["true_phi_rad"], log["true_theta_rad"], log["true_psi_rad"])]
@@ -291,66 +237,6 @@ def record_other(stream: rr.RecordingStream, log: FlightLog) -> None:
             stream.send_columns(f"{entity}/other", times, rr.Scalars.columns(scalars=values))
 
 
-def _blueprint(scene: Scene) -> Any:
-    import rerun as rr
-    import rerun.blueprint as rrb
-
-    # the whole flight, also where it is longer than the half minute either way that the viewer would show of it
-    always = rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
-    whole = rrb.TimeAxis(view_range=always)
-
-    def plot(entity: str, title: str, span: tuple[float, float] | None = None) -> Any:
-        axis = None if span is None else rrb.ScalarAxis(range=span)
-        return rrb.TimeSeriesView(
-            origin=entity, name=title, axis_x=whole, axis_y=axis, plot_legend=rrb.PlotLegend(visible=span is None)
-        )
-
-    x, y, z = scene.start
-    chase = rrb.Spatial3DView(
-        origin="world",
-        name="runway, true path (green) and estimated path (orange)",
-        background=(150, 178, 205),
-        line_grid=False,
-        eye_controls=rrb.EyeControls3D(
-            position=(x - 90.0, y - 35.0, z - 24.0),
-            look_target=(x, y, z),
-            eye_up=(0.0, 0.0, -1.0),
-            tracking_entity="world/aircraft/sight",
-        ),
-    )
-    image = rrb.Spatial2DView(origin=IMAGE, name="camera: windows (white), measured (yellow), predicted edges")
-    errors = rrb.Grid(
-        *(plot(e, title, SPANS.get(e)) for e, _, title, _ in ERRORS), grid_columns=4, name="errors and 3 sigma"
-    )
-    flight = rrb.Grid(*(plot(e, title) for e, title, _ in SERIES), grid_columns=4, name="flight and commands")
-    ranging = rrb.Horizontal(*(plot(e, title) for e, title, _ in RANGING), name="range of an unknown runway")
-    phases = rrb.Vertical(
-        rrb.StateTimelineView(origin="flight/phase", name="phase"),
-        rrb.TextLogView(origin="flight/events", name="events"),
-        name="phases and events",
-    )
-    return rrb.Blueprint(
-        rrb.Vertical(
-            rrb.Horizontal(chase, image, column_shares=[3, 2]),
-            rrb.Tabs(*([ranging] * scene.ranged), errors, flight, phases, active_tab=0),
-            row_shares=[3, 2],
-        ),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing", loop_mode="all"),
-        rrb.SelectionPanel(state="hidden"),
-        rrb.BlueprintPanel(state="hidden"),
-    )
-
-
-def _mesh(mesh: shapes.Mesh, colour: overlay.Colour) -> Any:
-    vertices, triangles = mesh
-    return _rerun().Mesh3D(
-        vertex_positions=vertices,
-        triangle_indices=triangles,
-        vertex_normals=shapes.normals(mesh),
-        albedo_factor=colour,
-    )
-
-
 def _jpeg(pixels: np.ndarray) -> bytes:
     import cv2
 
@@ -358,13 +244,3 @@ def _jpeg(pixels: np.ndarray) -> bytes:
     if not ok:
         raise ReplayError(f"cannot encode an image of shape {pixels.shape}")
     return bytes(data)
-
-
-def _rerun() -> Any:
-    try:
-        import rerun
-    except ImportError as error:
-        raise ReplayError(
-            f"rerun is missing ({error}): pip install 'rerun-sdk>=0.41,<0.42', or run with --no-record"
-        ) from error
-    return rerun
