@@ -116,6 +116,12 @@ def on_ray(y: Array, depth: float) -> Array:
     return np.array([y[0], y[1], 1.0]) * depth
 
 
+def begin(y: Array, range_guess: float) -> State:
+    """`RangeObserver.start` of an observer whose own variables need a motion first."""
+    y = np.asarray(y, dtype=float)
+    return State(on_ray(y, range_guess), y, np.empty(0))
+
+
 def guess_on_ray(guess: Array, y: Array, refuse_beyond: float = NEAR_RAY) -> float:
     """The depth [m] to start with from a guessed position (3,) [m]: that of its nearest point on the measured ray.
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from landing_sim.estimators.ranging.advance import advance
-from landing_sim.estimators.ranging.contract import Motion, State, arrive, coast, on_ray
+from landing_sim.estimators.ranging.contract import Motion, State, arrive, begin, coast
 from landing_sim.estimators.ranging.perspective import drift
 from landing_sim.jit import kernel
 from landing_sim.types import Array
@@ -35,8 +35,7 @@ class Dixon:
     longest: float = 1e-3
 
     def start(self, y: Array, range_guess: float) -> State:
-        y = np.asarray(y, dtype=float)
-        return State(on_ray(y, range_guess), y, np.empty(0))
+        return begin(y, range_guess)
 
     def step(self, state: State, y: Array, motion: Motion, dt: float) -> State:
         y = np.asarray(y, dtype=float)
