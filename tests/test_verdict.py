@@ -167,3 +167,12 @@ def test_sweep_stops_at_the_first_that_is_not_shown() -> None:
     assert all(row.n == 500 for row in found.judged)
     (none,) = sweep([risk(1e-9)], held, {"sink": values}, landed(n))
     assert none.largest_passing is None
+
+
+def test_rare_event_run_of_one_swept_value() -> None:
+    """It speaks for the value that it held and for no other."""
+    held = np.array([5.0, 10.0])[np.arange(1000) % 2]
+    (found,) = sweep(
+        [risk(1e-6)], held, {"sink": _sinks(1000)}, landed(1000), 0, {"hard landing": Bounds(1e-9, 0, 1e-8)}, 10.0
+    )
+    assert [row.method for row in found.judged] == ["tail", "rare-event"]

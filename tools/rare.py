@@ -1,6 +1,6 @@
 """Rare events of a campaign, on the real loop.
 
-usage: tools/rare CAMPAIGN [--risk NAME]... [--landings N] [--share P] [--workers N] [--held K] [--out DIR]
+usage: tools/rare CAMPAIGN [--risk NAME]... [--landings N] [--share P] [--workers N] [--held VALUE] [--out DIR]
        tools/rare CAMPAIGN --risk NAME --agree N     subset simulation against N plain landings, both flown here
        tools/rare CAMPAIGN --risk NAME --falsify     the mildest gust that breaks the limit in run 0
 
@@ -20,7 +20,7 @@ import numpy as np
 from landing_sim.campaign import file
 from landing_sim.campaign.falsify import falsify
 from landing_sim.campaign.rare import Estimate, Level, simulate
-from landing_sim.campaign.rare_landings import Landings, Links, gust_margin, save
+from landing_sim.campaign.rare_landings import Landings, Links, aimed, gust_margin, save
 from landing_sim.campaign.verdict import count_bounds
 
 
@@ -50,7 +50,7 @@ def main() -> int:
     parser.add_argument("--landings", type=int, default=1000, help="a level")
     parser.add_argument("--share", type=float, default=0.1, help="of them that go on to the next level")
     parser.add_argument("--workers", type=int)
-    parser.add_argument("--held", type=int, default=0, help="index of the sweep's value")
+    parser.add_argument("--held", type=float, help="the sweep's value; the one it aims at if left out")
     parser.add_argument("--agree", type=int, metavar="N")
     parser.add_argument("--falsify", action="store_true")
     parser.add_argument("--largest", type=float, default=15.0, help="m/s, of the gusts tried")
@@ -60,24 +60,28 @@ def main() -> int:
     risks = [risk for risk in plan.campaign.risks if not args.risk or risk.name in args.risk]
     if len(risks) < len(args.risk or [1]):
         parser.error(f"its risks are: {', '.join(risk.name for risk in plan.campaign.risks)}")
+    sweep = plan.campaign.sweep
+    held = aimed(plan) if args.held is None else args.held
+    if held is not None and (sweep is None or held not in sweep.values):
+        parser.error(f"--held {held:g} is none of the sweep's values")
+    run = 0 if sweep is None or held is None else sweep.values.index(held)
     good = True
     for risk in risks:
         print(f"{plan.campaign.name}: {risk.name}", flush=True)
         if args.falsify:
             start = float(plan.scenario["initial"]["x_m"])
             places = np.linspace(0.5 * start, 200.0, 5).tolist()
-            found = falsify(gust_margin(plan, risk), places, [30.0, 100.0, 250.0], args.largest)
+            found = falsify(gust_margin(plan, risk, run), places, [30.0, 100.0, 250.0], args.largest)
             print(f"  {found.gust or 'nothing breaks it'}, {found.flights} flights", flush=True)
             continue
         began = time.monotonic()
-        space = Landings(plan, risk, args.workers, args.held)
+        space = Landings(plan, risk, args.workers, run)
         estimate = simulate(space, args.landings, args.share, told=told)
         show(estimate)
         if args.agree:
             good &= agree(space, estimate, args.agree)
         else:
             folder = args.out or Path("out") / plan.campaign.name
-            held = plan.campaign.sweep.values[args.held] if plan.campaign.sweep else None
             print(f"  {save(folder, plan, risk, estimate, held=held, seconds=time.monotonic() - began)}", flush=True)
     return 0 if good else 1
 

@@ -128,13 +128,19 @@ def save(folder: Path, plan: Plan, risk: Risk, estimate: Estimate[Links], **what
 
 
 def saved(folder: Path, plan: Plan) -> dict[str, Bounds]:
-    """Bounds by the risks' names, of the runs that were of this very campaign and these very limits."""
+    """Bounds by the risks' names, of the runs of this very campaign and these very limits, at the value a sweep aims at."""
     limits = {risk.name: (risk.metric, risk.above, risk.below) for risk in plan.campaign.risks}
     return {
         name: Bounds(found["probability"], found["lower"], found["upper"])
         for name, found in _read(folder, plan).items()
-        if limits.get(name) == (found["metric"], found["above"], found["below"])
+        if limits.get(name) == (found["metric"], found["above"], found["below"]) and found.get("held") == aimed(plan)
     }
+
+
+def aimed(plan: Plan) -> float | None:
+    """The value of a sweep that the campaign's verdict is about, as the file gives it; None without a sweep."""
+    sweep = plan.campaign.sweep
+    return None if sweep is None else sweep.values[-1] if sweep.aim is None else sweep.aim
 
 
 def details(folder: Path, plan: Plan) -> Mapping[str, Mapping[str, Any]]:

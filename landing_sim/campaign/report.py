@@ -36,7 +36,7 @@ def html(results: Results, plan: Plan, folder: Path, rare: Mapping[str, Bounds] 
     import jinja2
 
     campaign, columns, outcome = results.campaign, results.columns, results.outcome
-    aim, swept = _sweep(results, campaign)
+    aim, swept = _sweep(results, campaign, rare)
     use = np.ones(len(results), bool) if aim is None else columns[campaign.sweep.path] == aim[0]  # type: ignore[union-attr]
     rows = verdict.sheet(
         campaign.risks, {name: column[use] for name, column in columns.items()}, outcome[use], rare, campaign.seed
@@ -77,17 +77,17 @@ def html(results: Results, plan: Plan, folder: Path, rare: Mapping[str, Bounds] 
 # ------------------------------------------------------------------------------------------------------- verdict
 
 
-def _sweep(results: Results, campaign: Campaign) -> tuple[tuple[float, str] | None, tuple[verdict.Swept, ...]]:
+def _sweep(
+    results: Results, campaign: Campaign, rare: Mapping[str, Bounds] | None
+) -> tuple[tuple[float, str] | None, tuple[verdict.Swept, ...]]:
     """The value that the verdict is about, as the column has it and in words, and the verdicts at every value."""
     sweep = campaign.sweep
     if sweep is None:
         return None, ()
     held = results.columns[sweep.path]
-    aim = sweep.values[-1] if sweep.aim is None else sweep.aim
-    at = aim * factor(sweep.path, sweep.unit)
-    nearest = float(held[np.argmin(np.abs(held - at))]) if len(held) else at
-    words = f"{sweep.path} = {part.held(nearest, campaign)}"
-    return (nearest, words), verdict.sweep(campaign.risks, held, results.columns, results.outcome, campaign.seed)
+    aim = (sweep.values[-1] if sweep.aim is None else sweep.aim) * factor(sweep.path, sweep.unit)
+    swept = verdict.sweep(campaign.risks, held, results.columns, results.outcome, campaign.seed, rare, aim)
+    return (aim, f"{sweep.path} = {part.held(aim, campaign)}"), swept
 
 
 def _summary(rows: Sequence[Judged], aim: tuple[float, str] | None, campaign: Campaign) -> str:

@@ -57,6 +57,7 @@ class Section:
 
 
 def event(row: Judged) -> str:
+    """The event in words, with its unit."""
     parts = [f"< {row.below:g}"] if row.below is not None else []
     parts += [f"> {row.above:g}"] if row.above is not None else []
     return f"{label(row.metric)} {' or '.join(parts)}"
@@ -71,6 +72,7 @@ def held(value: float | None, campaign: Campaign) -> str:
 
 
 def bounds(rows: Sequence[Judged]) -> list[Section]:
+    """Every risk's intervals in one figure."""
     if not rows:
         return []
     caption = (
@@ -80,6 +82,7 @@ def bounds(rows: Sequence[Judged]) -> list[Section]:
 
 
 def over_sweep(swept: Sequence[verdict.Swept], campaign: Campaign) -> list[Section]:
+    """Verdicts and bounds at every value of a sweep."""
     sweep = campaign.sweep
     if sweep is None or not swept:
         return []
@@ -98,6 +101,7 @@ def over_sweep(swept: Sequence[verdict.Swept], campaign: Campaign) -> list[Secti
 
 
 def footprint(results: Results, plan: Plan, rows: Sequence[Judged]) -> Section:
+    """Touchdowns on the drawn runway, with the legal box."""
     columns, outcome = results.columns, results.outcome
     runway = plan.scenario["runway"]
     x, y = columns["touchdown_x_m"], columns["touchdown_y_m"]
@@ -130,6 +134,7 @@ def _box(rows: Sequence[Judged]) -> tuple[float | None, float | None, float | No
 
 
 def distributions(rows: Sequence[Judged], columns: Mapping[str, Array], use: np.ndarray) -> list[Section]:
+    """Each risk's figure: histogram, limits, fitted tails."""
     figures = []
     for row in rows:
         values = columns[row.metric][use]
@@ -164,6 +169,7 @@ def severity(risk: Risk, values: Array, outcome: np.ndarray) -> Array:
 
 
 def worst(results: Results, rows: Sequence[Judged], use: np.ndarray, folder: Path) -> Section:
+    """The landings that came nearest to any risk's event, and how to watch them."""
     columns, outcome = results.columns, results.outcome
     title = f"The worst {WORST} landings"
     if not rows or not len(results):
@@ -194,6 +200,7 @@ def worst(results: Results, rows: Sequence[Judged], use: np.ndarray, folder: Pat
 
 
 def sensitivity(results: Results, use: np.ndarray) -> list[Section]:
+    """Which draws explain the scatter at touchdown."""
     columns = {name: column[use] for name, column in results.columns.items()}
     found = strongest(SCATTER, columns, results.dispersed, results.campaign.seed)
     if not found:
@@ -208,6 +215,8 @@ def sensitivity(results: Results, use: np.ndarray) -> list[Section]:
 
 
 def consistency(columns: Mapping[str, Array]) -> list[Section]:
+    """NEES over the stretches of the approach."""
+
     def words(band: tuple[float, float]) -> str:
         low, high = band
         if math.isinf(low):
@@ -228,6 +237,7 @@ def consistency(columns: Mapping[str, Array]) -> list[Section]:
 
 
 def drawn(results: Results) -> Section:
+    """Mean and spread of everything that was drawn."""
     headings = ("value", "mean", "sd", "least", "most")
     lines = []
     for name in results.dispersed:
@@ -240,6 +250,7 @@ def drawn(results: Results) -> Section:
 
 
 def effort(results: Results) -> Section:
+    """Sessions, machine, software, processor time."""
     columns, sessions = results.columns, results.meta["sessions"]
     lines = []
     for s in sessions:

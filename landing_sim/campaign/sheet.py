@@ -36,7 +36,7 @@ def sheet(results: Results, folder: Path, rare: Mapping[str, verdict.Bounds] | N
         scale = factor(sweep.path, sweep.unit)
         aim = sweep.values[-1] if sweep.aim is None else sweep.aim
         rows = []
-        swept = verdict.sweep(campaign.risks, columns[sweep.path], columns, outcome, campaign.seed)
+        swept = verdict.sweep(campaign.risks, columns[sweep.path], columns, outcome, campaign.seed, rare, aim * scale)
         for risk in swept:
             by_value = {
                 _given(held, sweep.values, scale): verdict.to_json(row) for held, row in zip(risk.values, risk.judged)

@@ -190,13 +190,26 @@ class Swept:
 
 
 def sweep(
-    risks: Iterable[Risk], held: Array, columns: Mapping[str, Array], outcome: np.ndarray, seed: int = 0
+    risks: Iterable[Risk],
+    held: Array,
+    columns: Mapping[str, Array],
+    outcome: np.ndarray,
+    seed: int = 0,
+    rare: Mapping[str, Bounds] | None = None,
+    rare_at: float | None = None,
 ) -> tuple[Swept, ...]:
-    """The verdicts at every value that was held; `held` (n,) is the swept column. By magnitude, smallest first."""
+    """The verdicts at every value that was held, by magnitude, smallest first.
+
+    held : (n,) the swept column
+    rare, rare_at : what rare-event runs found, by the risks' names, and the value that they held
+    """
     values = sorted({float(v) for v in held}, key=lambda v: (abs(v), v))
     found = []
     for risk in risks:
-        rows = [judge(risk, columns[risk.metric][held == v], outcome[held == v], seed=seed) for v in values]
+        rows = []
+        for v in values:
+            known = (rare or {}).get(risk.name) if v == rare_at else None
+            rows.append(judge(risk, columns[risk.metric][held == v], outcome[held == v], known, seed))
         passing = [v for i, v in enumerate(values) if all(row.verdict == PASS for row in rows[: i + 1])]
         found.append(Swept(risk.name, tuple(values), tuple(rows), passing[-1] if passing else None))
     return tuple(found)
