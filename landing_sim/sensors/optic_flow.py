@@ -83,3 +83,15 @@ class MotionSensor:
             (float(x), float(y), -self._terrain.height(float(x), float(y)) if math.isfinite(x) else math.nan),
         )
         return Sample(self.name, truth.t, truth.t, reading)
+
+
+class FootSwitch:
+    """interfaces.Sensor: 1.0 while any foot touches the ground, else 0.0."""
+
+    name = "squat"
+
+    def __init__(self, period: float) -> None:
+        self.period = period
+
+    def sense(self, truth: Truth, camera: CameraTruth) -> Sample:
+        return Sample(self.name, truth.t, truth.t, float(truth.on_ground.any()))
