@@ -82,10 +82,12 @@ def test_a_flow_moves_the_estimate_towards_it_and_contact_stops_it() -> None:
 
 def test_front_ends() -> None:
     reading = FlowReading(1.6, (math.radians(3.0), math.radians(0.4)), (9.9, 9.95), (0.0, 0.0, 0.0))
-    (only,) = FlowFrontEnd("flow_1", 1.57).process(Sample("flow_1", 10.0, 10.0, reading), estimate(0.0, REF.state(0)))
+    (only,) = FlowFrontEnd("flow_1", 1.57).process(
+        Sample("flow_1", 10.0, 10.0, reading), lambda: estimate(0.0, REF.state(0))
+    )
     assert only.z == pytest.approx([1.57, math.radians(3.0)]) and only.t_valid == 9.9  # believed, not true, direction
     assert math.degrees(math.sqrt(only.R[1])) == pytest.approx(0.25)
-    (contact,) = ContactFrontEnd().process(Sample("squat", 1.0, 1.0, 1.0), estimate(0.0, REF.state(0)))
+    (contact,) = ContactFrontEnd().process(Sample("squat", 1.0, 1.0, 1.0), lambda: estimate(0.0, REF.state(0)))
     assert contact.kind == "on_ground" and contact.z[0] == 1.0
 
 

@@ -6,6 +6,7 @@ Here the paper's signs end: outside, pitch and its rate are nose up, as everywhe
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -94,7 +95,7 @@ class FlowFrontEnd:
     share: float = 0.05
     slowest: float = math.radians(0.5)
 
-    def process(self, sample: Sample, estimate: Estimate) -> tuple[Measurement, ...]:
+    def process(self, sample: Sample, estimate: Callable[[], Estimate]) -> tuple[Measurement, ...]:
         out = []
         for flow, t in zip(sample.data.flows, sample.data.times):
             if abs(flow) >= self.slowest:
@@ -110,6 +111,6 @@ class ContactFrontEnd:
 
     sensor: str = "squat"
 
-    def process(self, sample: Sample, estimate: Estimate) -> tuple[Measurement, ...]:
+    def process(self, sample: Sample, estimate: Callable[[], Estimate]) -> tuple[Measurement, ...]:
         z = np.array([float(sample.data)])
         return (Measurement("on_ground", sample.t_valid, sample.t_arrival, z, np.zeros(1)),)
