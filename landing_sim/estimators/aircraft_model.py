@@ -139,10 +139,12 @@ def dynamics(x: Array, s: Array, par: Array, f: Array, A: Array, jacobian: bool)
         return
 
     # Aerodynamics by the chain rule. Columns of d: ua, va, wa, p, q, r, H; rows: the six accelerations.
-    A[:, :] = 0.0
+    for i in range(12):
+        for j in range(18):
+            A[i, j] = 0.0
     d = np.zeros((6, 7))
-    d_alpha = np.array([-wa / uw2, 0.0, ua / uw2])
-    d_beta = np.array([-ua * va / (V2 * uw), uw / V2, -wa * va / (V2 * uw)])
+    d_alpha = (-wa / uw2, 0.0, ua / uw2)
+    d_beta = (-ua * va / (V2 * uw), uw / V2, -wa * va / (V2 * uw))
     air = (ua, va, wa)
     bS = qS * par[_B]
     for i in range(7):
@@ -250,9 +252,7 @@ def propagate(x: Array, s: Array, u: Array, par: Array, on_ground: bool, dt: flo
     On the ground the gear carries the aircraft and no such model is at hand: velocities and rates are then held, and the
     process noise (larger there) accounts for what happens.
     """
-    A = np.zeros((12, 18))
-    k1, k2, k3, k4 = np.zeros(12), np.zeros(12), np.zeros(12), np.zeros(12)
-    y = x.copy()
+    A, k, y = np.zeros((12, 18)), np.zeros((4, 12)), x.copy()
     V = math.sqrt((x[0] - x[12]) ** 2 + x[1] ** 2 + x[2] ** 2)  # along-wind only: enough for a thrust lapse
     s0 = s.copy()
     a_s, a_e = math.exp(-dt / par[_TAU_S]), math.exp(-dt / par[_TAU_E])
@@ -264,30 +264,22 @@ def propagate(x: Array, s: Array, u: Array, par: Array, on_ground: bool, dt: flo
     s[4] = T + (s0[4] - T) * a_e
     eps = downwash(x, math.atan2(x[2], x[0]), s0[3], par)
     s[5] = eps + (s0[5] - eps) * a_d
-    mid = 0.5 * (s0 + s)
+    mid = np.empty(6)
+    for i in range(6):
+        mid[i] = 0.5 * (s0[i] + s[i])
 
-    dynamics(x, mid, par, k1, A, True)
-    if on_ground:
-        A[:6, :] = 0.0
-        for i in range(6):
-            k1[i] = 0.0
+    for stage in range(4):
+        share = 1.0 if stage == 3 else 0.5
+        for i in range(12 if stage > 0 else 0):
+            y[i] = x[i] + share * dt * k[stage - 1, i]
+        dynamics(y, mid, par, k[stage], A, stage == 0)
+        for i in range(6 if on_ground else 0):
+            k[stage, i] = 0.0
+    for i in range(6 if on_ground else 0):
+        for j in range(18):
+            A[i, j] = 0.0
     for i in range(12):
-        y[i] = x[i] + 0.5 * dt * k1[i]
-    dynamics(y, mid, par, k2, A, False)
-    if on_ground:
-        k2[:6] = 0.0
-    for i in range(12):
-        y[i] = x[i] + 0.5 * dt * k2[i]
-    dynamics(y, mid, par, k3, A, False)
-    if on_ground:
-        k3[:6] = 0.0
-    for i in range(12):
-        y[i] = x[i] + dt * k3[i]
-    dynamics(y, mid, par, k4, A, False)
-    if on_ground:
-        k4[:6] = 0.0
-    for i in range(12):
-        x[i] += dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
+        x[i] += dt / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
 
     # exp(A dt), rows of wind and offsets being zero: I + A dt (I + A dt/2 (I + A dt/3))
     n = 18

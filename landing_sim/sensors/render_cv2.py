@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from landing_sim.geometry.so3 import turned
 from landing_sim.jit import kernel
 from landing_sim.sensors.render_kernels import TABLE_HALF
 from landing_sim.types import Array
@@ -29,7 +30,7 @@ def _halve(corners: Array, n: int, a: float, b: float, c: float, out: Array) -> 
         di = a * corners[i, 0] + b * corners[i, 1] + c
         dj = a * corners[j, 0] + b * corners[j, 1] + c
         if di >= 0.0:
-            out[count] = corners[i]
+            out[count, 0], out[count, 1] = corners[i, 0], corners[i, 1]
             count += 1
         if (di >= 0.0) != (dj >= 0.0):
             t = di / (di - dj)
@@ -46,7 +47,7 @@ def _polygon(lines: Array, width: float, height: float, out: np.ndarray) -> int:
     now[0, 0] = now[3, 0] = now[0, 1] = now[1, 1] = -GUARD
     now[1, 0] = now[2, 0] = width - 1.0 + GUARD
     now[2, 1] = now[3, 1] = height - 1.0 + GUARD
-    count = 4
+    count = np.int64(4)
     for i in range(lines.shape[0]):
         count = _halve(now, count, lines[i, 0], lines[i, 1], lines[i, 2], then)
         now, then = then, now
@@ -67,14 +68,14 @@ def _polygons(lines: Array, count: int, horizon: Array, R_CR: Array, camera: Arr
     for i in range(HORIZON_TANGENTS):
         azimuth = 2.0 * math.pi * i / HORIZON_TANGENTS
         # Plane touching the dip cone at this azimuth: the ground is what lies inside all of them.
-        n = R_CR @ np.array([-s * math.cos(azimuth), -s * math.sin(azimuth), c])
+        n = turned(R_CR, -s * math.cos(azimuth), -s * math.sin(azimuth), c)
         tangents[i, 0], tangents[i, 1] = n[0] / f, n[1] / f
         tangents[i, 2] = n[2] - (n[0] * cx + n[1] * cy) / f
     corners[0] = _polygon(tangents, width, height, out[0])
     quad = np.empty((4, 3))
     for m in range(count):
-        quad[:] = lines[m, :, :3]
-        quad[:, 2] -= TABLE_HALF
+        for i in range(4):
+            quad[i, 0], quad[i, 1], quad[i, 2] = lines[m, i, 0], lines[m, i, 1], lines[m, i, 2] - TABLE_HALF
         corners[m + 1] = _polygon(quad, width, height, out[m + 1])
     return corners
 

@@ -219,13 +219,13 @@ def _draw_horizon(
     half = 0.5 * (w - 1)
     for r in range(h):
         v = v0 + r
-        side = _side(u0 + half, v, half, 0.0, horizon, camera)
+        side = _side(u0 + half, float(v), half, 0.0, horizon, camera)
         if side >= 0:
             for c in range(w):
                 block[r, c] = palette[side]
             continue
         for c in range(w):
-            value, gu, gv = _dip_function(u0 + c, v, horizon, camera)
+            value, gu, gv = _dip_function(float(u0 + c), float(v), horizon, camera)
             beyond = _beyond(value * (units / max(math.sqrt(gu * gu + gv * gv), 1e-30)) + TABLE_HALF, table)
             block[r, c] = (1.0 - beyond) * ground + beyond * sky
 

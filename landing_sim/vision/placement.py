@@ -82,11 +82,11 @@ def _place_horizon(F: Array, I: np.ndarray, at: int, n: int, view: View, sigma: 
                 continue
             l = sky.copy()
             for _ in range(4):  # the horizon's line turns with the azimuth it is looked at
-                line = feature_line(HORIZON, view.p_RC, view.R_CR, view.lens, view.width, view.slope, u, v)
+                line = feature_line(np.int64(HORIZON), view.p_RC, view.R_CR, view.lens, view.width, view.slope, u, v)
                 oriented(line, view.up, l)
                 u, v = on_line(l, u, v)
             su, sv, au, av, advance = path(l, 0.0, 0.0)
-            put(F, I, i, u, v, su, sv, au, av, advance, half, search, 3)
+            put(F, I, i, u, v, su, sv, au, av, advance, half, search, np.int64(3))
             break
 
 
@@ -121,8 +121,9 @@ def place(
     n_T = counts[THRESHOLD]
     seen = place_threshold(F, I, 0, n_T, view, sigma[THRESHOLD], rule, runway)
     n_L, n_R = counts[LEFT] + (n_T - seen + 1) // 2, counts[RIGHT] + (n_T - seen) // 2
-    place_border(F, I, n_T, n_L, LEFT, view, sigma, rule, paint, mouths, unknown)
-    place_border(F, I, n_T + n_L, n_R, RIGHT, view, sigma, rule, paint, mouths, unknown)
+    for side in range(2):  # LEFT, RIGHT: a variable, since a constant would be compiled for itself
+        at, count = (n_T, n_L) if side == LEFT else (n_T + n_L, n_R)
+        place_border(F, I, at, count, side, view, sigma, rule, paint, mouths, unknown)
     _place_horizon(F, I, n_T + n_L + n_R, counts[HORIZON], view, sigma[HORIZON], rule)
     n = n_T + n_L + n_R + counts[HORIZON]
     F, I = F[:n], I[:n]
