@@ -263,19 +263,19 @@ def _resolved(campaign: Campaign, document: yamlfile.Document, path: Path) -> di
 
 
 def _scenario_document(campaign: Campaign, document: yamlfile.Document, path: Path) -> yamlfile.Document:
-    names = paths.scenario_names()
+    names, where = paths.scenario_names(), ("scenario",)
     beside = path.parent / campaign.scenario
     file = beside if campaign.scenario not in names and beside.is_file() else None
     try:
         found = yamlfile.load(file or paths.scenario_file(campaign.scenario))
     except ConfigError as error:
-        where: Location = ("scenario",)
         if file is not None or any(p.mark.source.endswith((".yaml", ".yml")) and p.location for p in error.problems):
             raise
         raise ConfigError([Problem(document.mark(where), where, error.problems[0].message)]) from None
     if found.data.get("name") in (None, ""):
         found.data["name"] = Path(campaign.scenario).stem
-    scenario.check(copy.deepcopy(found))  # what is wrong in it is its own
+    if not isinstance(scenario.check(copy.deepcopy(found)), scenario.Scenario):  # what else is wrong in it is its own
+        raise ConfigError([Problem(document.mark(where), where, "is no runway landing: campaigns fly nothing else")])
     return found
 
 
