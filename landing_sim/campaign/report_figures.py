@@ -84,6 +84,7 @@ def footprint(
     """
     near, far, side = box
     known = np.isfinite(x) & np.isfinite(y)
+    small = 9.0 if known.sum() > 300 else 22.0
     least, most = (np.min(x[known]), np.max(x[known])) if known.any() else (0.0, 0.0)
     begin = min(-60.0, least - 60.0)
     end = min(max(1000.0, most + 120.0, (far or 0.0) + 120.0), length + 100.0)
@@ -112,9 +113,9 @@ def footprint(
             ax.add_patch(Rectangle((left, -reach), right - left, 2 * reach, **style))
         plain = known & ~event & ~odd
         for which, colour, name, size in (
-            (plain, "#8ecdf7", "landing", 9.0),
-            (odd & known & ~event, "#ffd166", "not landed", 22.0),
-            (event & known, "#ff5a4d", "a risk's event", 26.0),
+            (plain, "#8ecdf7", "landing", small),
+            (odd & known & ~event, "#ffd166", "not landed", 26.0),
+            (event & known, "#ff5a4d", "a risk's event", 32.0),
         ):
             if which.any():
                 ax.scatter(x[which], y[which], s=size, color=colour, alpha=0.75 if which is plain else 1.0, lw=0,
@@ -135,7 +136,7 @@ def distribution(row: Judged, values: Array) -> str:
     def draw(axes: Any) -> None:
         left, right = axes
         limits = [limit for limit in (row.below, row.above) if limit is not None]
-        left.hist(values, bins=min(80, max(12, int(2 * len(values) ** (1 / 3)))), color=TRUE, alpha=0.85, lw=0)
+        left.hist(values, bins=min(60, max(6, int(2 * len(values) ** (1 / 3)))), color=TRUE, alpha=0.85, lw=0)
         right.set_yscale("log")
         sides = [(side, limit) for side, limit in ((-1, row.below), (+1, row.above)) if limit is not None]
         for side, limit in sides:
@@ -150,7 +151,7 @@ def distribution(row: Judged, values: Array) -> str:
         right.set_ylim(min(row.probability / 30.0, 0.2 / max(len(values), 1)), 1.5)
         handles, names = right.get_legend_handles_labels()
         unique = dict(zip(names, handles))
-        right.legend(unique.values(), unique.keys(), loc="center" if len(sides) == 2 else "best")
+        right.legend(unique.values(), unique.keys(), loc="lower center" if len(sides) == 2 else "best")
 
     return svg(draw, 2, 2.9)
 
@@ -162,6 +163,8 @@ def _tails(row: Judged) -> tuple[Tail, ...]:
 def _survival(ax: Any, side: int, values: Array, limit: float, tail: Tail | None, row: Judged) -> None:
     """The share of values at x or beyond, and its fitted tail out past the limit."""
     ordered = np.sort(side * values)[::-1]
+    if row.above is not None and row.below is not None:  # the outer half alone: the inner ones would cross
+        ordered = ordered[: (len(ordered) + 1) // 2]
     share = np.arange(1, len(ordered) + 1) / max(row.n, 1)
     ax.plot(side * ordered, share, ".", ms=3.5, color=TRUE, label="landings", rasterized=len(values) > 500)
     if tail is None:

@@ -258,7 +258,8 @@ def effort(results: Results) -> Section:
         landings, seconds = s.get("landings"), s.get("seconds")
         rate = f"{landings / seconds:.2f}" if landings and seconds else "–"
         machine = s.get("machine", {})
-        workers = "dask" if s.get("workers") is None else f"{s['workers']} processes"
+        count = s.get("workers")
+        workers = "dask" if count is None else "1 process" if count == 1 else f"{count} processes"
         lines.append(
             (
                 began,
