@@ -159,6 +159,20 @@ def test_the_image_says_nothing_of_the_scale_and_the_filter_knows() -> None:
     assert abs(scene.s[sc.WIDTH] / (1.4 * 45.0) - 1.0) < 0.02
 
 
+def test_a_runway_that_does_not_come_nearer_is_far_but_not_at_infinity() -> None:
+    """The unit says 70 m/s, the image stands still: as far as the widest runway there is would be."""
+    ekf = KinematicEkf(EkfConfig(widest=90.0), LENS)
+    p_RC, R_RB, v = np.array([-3000.0, 40.0, -160.0]), from_euler(0.0, 0.07, 0.0), np.array([70.0, 0.0, 3.5])
+    scene = ekf.start(scene_at(p_RC, 45.0), start_covariance(), 0.0)
+    widths = []
+    for k in range(100):
+        z = reading(v, v * DT)
+        scene = ekf.move(scene, v * DT, DT)
+        scene = ekf.look(scene, Image(k * DT, edges_of(p_RC, R_RB, 45.0), z), carriage(z, scene.s))
+        widths.append(float(scene.s[sc.WIDTH]))
+    assert max(widths) == pytest.approx(90.0)
+
+
 def own(s: Array) -> Array:
     """The filter's coordinates: lengths in widths, and the width's inverse; its own inverse."""
     out = s.copy()

@@ -52,10 +52,11 @@ class EkfConfig:
     q_camera: float = 0.001 * RAD
     q_edge: float = 0.02  # [px]
     q_bias: float = 0.01  # [m/s]
-    edge_floor: float = 0.2  # [px] of each window: what is wrong with it stays so for many images
+    edge_floor: float = 0.35  # [px] of each window: what is wrong with it stays so for many images
     edge_sigma: float = 0.1  # [px] prior of what paint and blur move all windows of a feature by
     velocity_sigma: float = 0.5  # [m/s] prior of the inertial velocity's bias, each axis
     attitude_noise: float = 0.01 * RAD  # of each image, common to all its edges
+    widest: float = 100.0  # [m] there are no wider runways: a range that noise drives towards infinity comes back late
     gate_sigma: float = 5.0
     start_frames: int = 10  # robust and ungated
     huber: float = 2.0
@@ -141,7 +142,7 @@ class KinematicEkf:
             R = R * np.maximum(1.0, np.abs(nu) / (c.huber * np.sqrt(s2)))
         P, step, nis = kalman.update_dense(P, Hn, R, nu, use, _WITH_NOISE)
         s = scene.s + step[: sc.N]
-        mu = max(1.0 / W + step[MU], 0.2 / W)
+        mu = max(1.0 / W + step[MU], 0.5 / W, 1.0 / c.widest)
         s[sc.WIDTH] = 1.0 / mu
         s[XI] = (scene.s[XI] / W + step[XI]) / mu
         dof = int(use.sum())
