@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 import traceback
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -157,8 +158,9 @@ def check(
             elif _is_campaign(name):
                 campaign_file.load(name)
             else:
-                model = scenario.load(name).aircraft.model
-                vehicle.load_file(paths.aircraft_folder(model) / "vehicle.yaml")
+                found = scenario.load(name)
+                if found.mission == "runway_landing":
+                    vehicle.load_file(paths.aircraft_folder(found.aircraft.model) / "vehicle.yaml")
         except ConfigError as error:
             problems += error.problems
         else:
@@ -168,12 +170,17 @@ def check(
 
 
 @app.command()
-def schema(campaign: Annotated[bool, typer.Option("--campaign", help="Of campaign files.")] = False) -> None:
+def schema(
+    campaign: Annotated[bool, typer.Option("--campaign", help="Of campaign files.")] = False,
+    lunar: Annotated[bool, typer.Option("--lunar", help="Of lunar landings.")] = False,
+) -> None:
     """Print the JSON Schema of scenario files, or of campaigns, for editors."""
+    from landing_sim import scenario
+
     if campaign:
         from landing_sim.campaign.file import schema_text
     else:
-        from landing_sim.scenario import schema_text
+        schema_text = partial(scenario.schema_text, "lunar_landing" if lunar else "runway_landing")
 
     typer.echo(schema_text(), nl=False)
 
@@ -235,7 +242,7 @@ def _fly(
 
     folder = out or Path("out") / f"{scenario.name}-{scenario.seed}"
     runner.check_out(folder)
-    craft = vehicle.load(scenario.aircraft.model)
+    craft = vehicle.load(scenario.aircraft.model) if scenario.mission == "runway_landing" else None
     with runner.out_folder(folder) as work:
         recording = work / runner.RECORDING if record else None
         try:

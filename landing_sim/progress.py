@@ -60,8 +60,10 @@ def shown(scenario: Scenario) -> Iterator[Callable[[Step], None]]:
 
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[state]}"), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        start = scenario.initial.x_m
-        task = bar.add_task(escape(scenario.name), total=scenario.runway.length_m - start, state="compiling, loading")
+        on_runway = scenario.mission == "runway_landing"
+        start = scenario.initial.x_m if on_runway else -850.0
+        total = scenario.runway.length_m - start if on_runway else -start
+        task = bar.add_task(escape(scenario.name), total=total, state="compiling, loading")
 
         def watch(step: Step) -> None:
             x, height, airspeed = step.truth.p_RB[0], -step.truth.p_RB[2], step.truth.airspeed

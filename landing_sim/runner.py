@@ -64,6 +64,12 @@ def fly(
 
     Raises ScenarioError where the aircraft cannot fly what the scenario wants at the start, ReplayError from the recording.
     """
+    if scenario.mission not in MISSIONS:
+        from landing_sim.missions import lunar_flight
+        from landing_sim.sections.lunar import LunarScenario
+
+        assert isinstance(scenario, LunarScenario)
+        return lunar_flight.fly(scenario, watch, recording, live, noise)
     started = time.perf_counter()
     try:
         mission = MISSIONS[scenario.mission](scenario, vehicle, scenario.seed, scenario.run, noise)

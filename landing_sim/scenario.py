@@ -21,6 +21,7 @@ from landing_sim.config import Section, inconsistent
 from landing_sim.errors import ConfigError, Location, Problem, ScenarioError, did_you_mean
 from landing_sim.sections import wind
 from landing_sim.sections.judged import LANDING, Criterion, Record
+from landing_sim.sections.lunar import LunarScenario
 from landing_sim.sections.onboard import Believed, Control, Filter, Guidance, Observer, Vision
 from landing_sim.sections.sensors import Camera, Sensors
 from landing_sim.sections.wind import Wind
@@ -97,7 +98,7 @@ def _whole(period: float, unit: float) -> bool:
     return abs(period - count * unit) <= 1e-9 * max(period, unit) and (count > 0 or period == 0)
 
 
-MODELS: dict[str, type[Scenario]] = {"runway_landing": Scenario}
+MODELS: dict[str, Any] = {"runway_landing": Scenario, "lunar_landing": LunarScenario}
 """What each word of `mission` is checked against."""
 
 
@@ -123,28 +124,32 @@ def load(name: str | Path, overrides: Iterable[str] = ()) -> Scenario:
 
 
 def check(document: yamlfile.Document) -> Scenario:
-    """A document as the scenario its mission asks for. Raises ConfigError holding every problem with its place."""
+    """A document as the scenario its mission asks for: of a lunar descent, a LunarScenario.
+
+    Raises ConfigError holding every problem with its place.
+    """
     mission = document.data.get("mission")
     scenario = config.validate(document, MODELS.get(mission, Scenario) if isinstance(mission, str) else Scenario)
-    if scenario.aircraft.model not in paths.aircraft_names():
+    if isinstance(scenario, Scenario) and scenario.aircraft.model not in paths.aircraft_names():
         where: Location = ("aircraft", "model")
         near = did_you_mean(scenario.aircraft.model, paths.aircraft_names())
         message = f"no aircraft {scenario.aircraft.model!r}{near}"
         raise ConfigError([Problem(document.mark(where), where, message)])
-    return scenario
+    found: Scenario = scenario
+    return found
 
 
-def schema() -> dict[str, Any]:
-    """The JSON Schema of scenario files, for editors."""
-    out = Scenario.model_json_schema()
+def schema(mission: str = "runway_landing") -> dict[str, Any]:
+    """The JSON Schema of a mission's scenario files, for editors."""
+    out: dict[str, Any] = MODELS[mission].model_json_schema()
     out["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     out["title"] = "landing-sim scenario"
     return out
 
 
-def schema_text() -> str:
-    """`schema()` as it is shipped in scenarios/schema.json."""
-    return json.dumps(schema(), indent=1, ensure_ascii=False) + "\n"
+def schema_text(mission: str = "runway_landing") -> str:
+    """`schema()` as it is shipped in scenarios/schema.json; of a lunar landing, in schema_lunar.json."""
+    return json.dumps(schema(mission), indent=1, ensure_ascii=False) + "\n"
 
 
 def dump(scenario: Scenario) -> dict[str, Any]:

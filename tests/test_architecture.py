@@ -136,6 +136,6 @@ def test_no_setting_is_ignored() -> None:
             yield from (leaf for section in sections for leaf in leaves(section))
             yield name
 
-    for model in (scenario.Scenario, vehicle.Vehicle):
+    for model in (*scenario.MODELS.values(), vehicle.Vehicle):
         ignored = set(leaves(model)) - reads - elsewhere
         assert not ignored, f"nothing reads {sorted(ignored)} of a {model.__name__}"

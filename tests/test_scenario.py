@@ -47,10 +47,11 @@ def test_defaults_are_the_acceptance_setting(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", paths.scenario_names())
 def test_shipped_scenarios_load_and_name_their_schema(name: str) -> None:
     file = paths.scenario_file(name)
-    assert file.read_text().startswith("# yaml-language-server: $schema=../schema.json\n")
     s = scenario.load(name)
+    schema = "schema" if s.mission == "runway_landing" else "schema_lunar"
+    assert file.read_text().startswith(f"# yaml-language-server: $schema=../{schema}.json\n")
     assert s.description
-    again = scenario.Scenario.model_validate_json(json.dumps(scenario.dump(s)))
+    again = scenario.MODELS[s.mission].model_validate_json(json.dumps(scenario.dump(s)))
     assert again == s
 
 
@@ -75,6 +76,9 @@ def test_what_is_shipped() -> None:
 def test_shipped_schema_is_the_models() -> None:
     shipped = paths.data_folder("scenarios") / "schema.json"
     assert shipped.read_text() == scenario.schema_text(), "run: landing-sim schema > scenarios/schema.json"
+    lunar = paths.data_folder("scenarios") / "schema_lunar.json"
+    told = "run: landing-sim schema --lunar > scenarios/schema_lunar.json"
+    assert lunar.read_text() == scenario.schema_text("lunar_landing"), told
 
 
 def test_every_value_is_described() -> None:
@@ -85,7 +89,8 @@ def test_every_value_is_described() -> None:
             assert definition.get("description"), definition.get("title")
             walk(definition)
 
-    walk(scenario.schema())
+    for mission in scenario.MODELS:
+        walk(scenario.schema(mission))
 
 
 WRONG = {

@@ -74,6 +74,14 @@ class Descent(Section):
     patience_s: NotNegative = Field(4.0, description="before the estimate is flown")
 
 
+class Limits(Section):
+    """What makes it a landing: at the first foot's touch."""
+
+    sink_rate_mps: Positive = Field(2.0, description="vertical speed")
+    groundspeed_mps: Positive = Field(1.0, description="horizontal speed")
+    tilt_deg: Positive = Field(10.0, description="off the vertical")
+
+
 class LunarScenario(Section):
     """One descent."""
 
@@ -92,6 +100,7 @@ class LunarScenario(Section):
     sensors: Eyes = Field(Eyes(), description="the only ones")
     filter: Observer = Field(Observer(), description="estimator")
     control: Descent = Field(Descent(), description="guidance and control")
+    criteria: Limits = Field(Limits(), description="what makes it pass")
 
     @model_validator(mode="after")
     def _consistent(self) -> LunarScenario:
