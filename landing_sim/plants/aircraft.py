@@ -104,8 +104,10 @@ class JsbsimPlant:
         self._contacts = read_contacts(self._folder / f"{self._folder.name}.xml", model.nominal_cg)
         n = len(self._contacts.names)
         self._height, self._bristle, self._pushing = np.full(n, math.inf), np.zeros((n, 2)), False
-        self._site = np.vstack([self._frame.origin_E, self._frame.R_RE, model.cg_offset_B])
         self._body, self._tick = np.zeros((motion.ROWS, 3)), 0
+        site = np.vstack([self._frame.origin_E, self._frame.R_RE, model.cg_offset_B])
+        p_B, values = self._contacts.p_B, self._contacts.values
+        self._settling = (self._slope, self.dt, site, p_B, values, self._height, self._bristle, self._body)
         self._touchdown: Touchdown | None = None
         if self._platform is not None:
             self._platform.reset(*self._start_angles)
@@ -196,12 +198,11 @@ class JsbsimPlant:
     def _settle(self, command: Command) -> list[float]:
         """Take over where JSBSim has got to; tell it what lies below: terrain for the ground effect, and what the ground
         does to the wheels until the next step. Returns p, q, r [rad/s]."""
-        model, contacts = self._model, self._contacts
+        model = self._model
         said = [read() for read in model.motion]
         self._x, self._y, self._H, elevation, least, finite = motion.settle(  # type: ignore[call-arg]
-            *said, command.brake_left, command.brake_right, self._slope, self.dt, self._site,
-            contacts.p_B, contacts.values, self._height, self._bristle, self._body,
-        )  # fmt: skip
+            *said, command.brake_left, command.brake_right, *self._settling
+        )
         if not finite:
             raise PlantError(f"the flight model's state is not finite at t = {self._tick * self.dt:.3f} s")
         if abs(self._x) + abs(self._H) > FAR_AWAY:
