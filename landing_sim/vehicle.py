@@ -10,7 +10,7 @@ from pydantic import Field
 from landing_sim import config, paths, yamlfile
 from landing_sim.config import Section
 from landing_sim.control.settings import ControlSettings, GuidanceSettings, SpeedSettings
-from landing_sim.control.speeds import approach_speed, at_speed
+from landing_sim.control.speeds import approach_speed, at_speed, in_turbulence
 from landing_sim.errors import ConfigError, VehicleError
 from landing_sim.estimators.belief import AircraftBelief
 
@@ -49,16 +49,20 @@ class Vehicle(Section):
         None, description="approach speed from mass and headwind; null = guidance.path.approach_mps and nominal mass"
     )
 
-    def prepared(self, mass: float, headwind: float, density: float) -> Vehicle:
+    def prepared(self, mass: float, headwind: float, density: float, turbulence: float = 0.0) -> Vehicle:
         """For one approach, as its crew prepares it: airspeeds and mass [kg] that gains and guidance are made for.
 
-        headwind [m/s], density [kg/m^3] as known on board. Without a speed rule nothing changes.
+        headwind [m/s], density [kg/m^3], turbulence (the wind at 20 ft that goes with it [m/s]) as known on board.
+        Without a speed rule the approach is flown as it stands in the file.
         """
-        if self.speeds is None:
-            return self
-        V = approach_speed(self.speeds, mass, headwind, density)
-        control, guidance = at_speed(V, self.control, self.guidance)
-        return self.model_copy(update={"mass_kg": mass, "control": control, "guidance": guidance})
+        vehicle = self
+        if self.speeds is not None:
+            V = approach_speed(self.speeds, mass, headwind, density)
+            control, guidance = at_speed(V, self.control, self.guidance)
+            vehicle = self.model_copy(update={"mass_kg": mass, "control": control, "guidance": guidance})
+        if turbulence > 0.0 and self.guidance.path.turbulence_share > 0.0:
+            return vehicle.model_copy(update={"guidance": in_turbulence(turbulence, vehicle.guidance)})
+        return vehicle
 
 
 def load(name: str) -> Vehicle:

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from landing_sim import vehicle
 from landing_sim.control.believed import believed, motion
 from landing_sim.control.guidance import Capture, GuidanceMemory, LandingGuidance, Path
 from landing_sim.control.pointing import look_along
@@ -19,8 +20,10 @@ from landing_sim.control.settings import (
     GearSettings,
     GoAroundSettings,
     GuidanceSettings,
+    HoldOffSettings,
     PathSettings,
 )
+from landing_sim.control.speeds import KNOT, in_turbulence
 from landing_sim.geometry import so3
 from landing_sim.signals import Estimate, Reference
 
@@ -93,6 +96,40 @@ def test_path_and_speed_are_continuous_with_the_derivatives_they_claim() -> None
     assert path.speed(600.0) == (43.0, 0.0)
     V, slope = path.speed(100.0)
     assert V * slope == pytest.approx((43.0**2 - 50.0**2) / (2 * (550.0 - path.flare_x)))  # constant deceleration
+
+
+@pytest.mark.parametrize(("height", "share"), [(9.0, 1.0), (8.0, 1.0), (5.5, 0.7), (3.0, 0.4), (1.0, 0.4)])
+def test_near_the_ground_less_of_a_height_error_is_flown_back(height: float, share: float) -> None:
+    """The wheels half a metre above the path: between 8 and 3 m the share falls from 1 to 0.4."""
+    hold_off = HoldOffSettings(from_height_m=8.0, to_height_m=3.0, share=0.4)
+    guidance = LandingGuidance(replace(SETTINGS, path=replace(SETTINGS.path, hold_off=hold_off)))
+    path = guidance.path
+    x = path.flare_x + path.length * math.log(path.top / (height - 0.5 + path.sink_height))
+    H = height + 1.8
+    _, reference = fly(guidance, GuidanceMemory("flare", 0.0, 0.0), estimate(0.06, x=x - 0.6, H=H))
+    assert reference.height - H == pytest.approx(-0.5 * share, abs=1e-6)
+
+
+def test_hold_off_that_cannot_be() -> None:
+    with pytest.raises(ValueError, match="from_height_m must be above"):
+        HoldOffSettings(from_height_m=3.0, to_height_m=3.0, share=0.4)
+    with pytest.raises(ValueError, match="share must be above 0"):
+        HoldOffSettings(from_height_m=8.0, to_height_m=3.0, share=0.0)
+    with pytest.raises(ValueError, match="turbulence_share must be 0 or more"):
+        replace(SETTINGS.path, turbulence_share=-0.1)
+
+
+def test_some_speed_is_kept_in_turbulence() -> None:
+    """A fifth of 30 kt is 3.09 m/s; never more than the approach's speed."""
+    wanted = replace(SETTINGS, path=replace(SETTINGS.path, turbulence_share=0.2))
+    assert in_turbulence(30.0 * KNOT, wanted).path.touchdown_mps == pytest.approx(43.0 + 3.0867, abs=1e-3)
+    assert in_turbulence(45.0 * KNOT, wanted).path.approach_mps == 50.0
+    assert in_turbulence(100.0 * KNOT, wanted).path.touchdown_mps == 50.0
+    assert in_turbulence(30.0 * KNOT, SETTINGS) == SETTINGS
+    do128 = vehicle.load("do128")
+    at = do128.prepared(4000.0, 0.0, 1.2, 30.0 * KNOT).guidance.path
+    assert at.touchdown_mps == pytest.approx(do128.guidance.path.touchdown_mps + 3.0867, abs=1e-3)
+    assert do128.prepared(4000.0, 0.0, 1.2, 0.0) is do128
 
 
 def test_capture_by_hand() -> None:

@@ -194,7 +194,7 @@ class LandingGuidance:
             slope, curvature = path.rise - falling / path.length, falling / path.length**2
             V, V_slope = path.touchdown, 0.0
         limit = s.path.height_error_limit_m
-        error = min(max(-over_path, -limit), limit)
+        error = min(max(-over_path, -limit), limit) * self._firmness(height)
         crab = -memory.crosswind / max(m.airspeed, 0.5 * path.touchdown)
         d = s.decrab
         aligned = d.fraction * min(max((d.start_height_m - height) / (d.start_height_m - d.end_height_m), 0.0), 1.0)
@@ -220,6 +220,14 @@ class LandingGuidance:
             "on_path": float(abs(over_path) < limit),
         }
         return Reference(memory.mode, V, b.H + error, slope * m.x_dot, y, psi, phi, 0.0, r, extra)
+
+    def _firmness(self, height: float) -> float:
+        """Share of a height error that is flown back, at a height [m] of the wheels."""
+        h = self.settings.path.hold_off
+        if h is None or height >= h.from_height_m:
+            return 1.0
+        near = min((h.from_height_m - height) / (h.from_height_m - h.to_height_m), 1.0)
+        return 1.0 - (1.0 - h.share) * near
 
     def _hold(self, memory: GuidanceMemory, b: Believed, m: Motion, height: float) -> Reference:
         """Straight on down the glide's angle, for want of a place to steer for: only velocity and attitude are known."""

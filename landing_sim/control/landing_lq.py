@@ -2,8 +2,9 @@
 
 In the air  u = u_ref - K (x - x_ref), longitudinal (u w q theta H int_V int_H) and lateral (v p r phi psi y) apart.
 u, v, w are velocities through the air, so that what acts on the wing is fed back, and the wind enters as a reference:
-theta_ref carries the updraught, psi_ref (from guidance) the crab. Gains and trim are interpolated over airspeed, those
-of the surfaces as moments (times V²).
+theta_ref carries the updraught, psi_ref (from guidance) the crab. A gust along the nose changes lift at once and airspeed
+for a moment: it is taken out of the airspeed fed back, since engines are slower than it, and the elevator answers it by
+itself. Gains and trim are interpolated over airspeed, those of the surfaces as moments (times V²).
 
 Source     Dickmanns & Schell 1992, section 6: state feedback with integral action on speed and altitude.
 """
@@ -45,8 +46,8 @@ class ControlMemory:
 class LandingController:
     """interfaces.Controller. Constants only; all memory is in ControlMemory."""
 
-    __slots__ = ("_camera", "_flaps", "_ground_effect", "_gust", "_integral", "_limits", "_look", "_rollout", "_schedule",
-                 "_slowest", "_thrust", "_trim")  # fmt: skip
+    __slots__ = ("_camera", "_flaps", "_ground_effect", "_gust", "_integral", "_limits", "_look", "_per_gust", "_rollout",
+                 "_schedule", "_slowest", "_thrust", "_trim")  # fmt: skip
 
     def __init__(self, design: Design, look: tuple[float, float] = (0.0, 0.0)) -> None:
         """look: pan and tilt [rad] that the platform is held at until the runway is found."""
@@ -65,6 +66,7 @@ class LandingController:
         self._flaps = (s.flap, s.flap if s.rollout.flap is None else s.rollout.flap)
         self._ground_effect = s.ground_effect
         self._gust = s.gust
+        self._per_gust = 0.0 if s.gust is None else math.radians(s.gust.elevator_deg_per_mps) * s.gust.airspeed_mps**2
         self._rollout = Rollout(s.rollout)
 
     def init(self) -> ControlMemory:
@@ -92,9 +94,8 @@ class LandingController:
             tailwind = math.nan
             flap = self._flaps[1]
         else:
-            elevator, throttle, aileron, rudder, int_V, int_H = self._fly(memory, b, m, reference, dt)
-            lift, tailwind = self._against_gusts(memory, b, m, dt)
-            elevator += lift
+            tailwind, gust = self._gusts(memory, b, dt)
+            elevator, throttle, aileron, rudder, int_V, int_H = self._fly(memory, b, m, reference, dt, gust)
             ground, left, right, flap = ON_TOUCHDOWN, 0.0, 0.0, self._flaps[0]
         last = memory.elevator if memory.elevator == memory.elevator else elevator
         elevator = _limited(elevator, last, dt, *self._limits[0])
@@ -105,27 +106,21 @@ class LandingController:
             elevator, aileron, rudder, throttle, flap, left, right, _clip(pan, most), _clip(tilt, most)
         )
 
-    def _against_gusts(self, memory: ControlMemory, b: Believed, m: Motion, dt: float) -> tuple[float, float]:
-        """Elevator [rad] against the lift that gusts along the nose give or take, and the tailwind [m/s], smoothed.
-
-        Airspeed is fed back slowly. A gust's lift is there at once, and near the ground a gust lasts half a second: it is
-        answered from the wind itself, and only as far as it is faster than the smoothing.
-        """
-        g = self._gust
-        if g is None:
-            return 0.0, math.nan
+    def _gusts(self, memory: ControlMemory, b: Believed, dt: float) -> tuple[float, float]:
+        """Tailwind along the nose [m/s]: smoothed, and what is faster; without settings for gusts there are none."""
+        if self._gust is None:
+            return math.nan, 0.0
         now = b.wx * math.cos(b.psi) + b.wy * math.sin(b.psi)
         slow = memory.tailwind if math.isfinite(memory.tailwind) else now
-        slow += dt / (dt + g.filter_s) * (now - slow)
-        per_q = (g.airspeed_mps / max(m.airspeed, self._slowest)) ** 2
-        return -math.radians(g.elevator_deg_per_mps) * per_q * (now - slow), slow
+        slow += dt / (dt + self._gust.filter_s) * (now - slow)
+        return slow, now - slow
 
     def _fly(
-        self, memory: ControlMemory, b: Believed, m: Motion, ref: Reference, dt: float
+        self, memory: ControlMemory, b: Believed, m: Motion, ref: Reference, dt: float, gust: float
     ) -> tuple[float, float, float, float, float, float]:
-        """elevator [rad], throttle, aileron, rudder [rad], int_V, int_H."""
+        """elevator [rad], throttle, aileron, rudder [rad], int_V, int_H. gust: tailwind [m/s] that will not last."""
         extra = ref.extra.get
-        V = max(m.airspeed, self._slowest)
+        V = max(m.airspeed + gust, self._slowest)
         (ke_u, ke_w, ke_q, ke_th, ke_H, ke_iV, ke_iH, kt_u, kt_w, kt_q, kt_th, kt_H, kt_iV, kt_iH,
          ka_v, ka_p, ka_r, ka_ph, ka_ps, ka_y, kr_v, kr_p, kr_r, kr_ph, kr_ps, kr_y,
          alpha, elevator0, thrust0, path0, mass, w_pull, el_pull, ph_slip, a_slip, r_slip, a_turn, r_turn,
@@ -140,7 +135,7 @@ class LandingController:
         wz = extra("downdraught", b.wz)
         path = (ref.climb_rate + wz) / V
         q_ref = extra("pull", 0.0) / V
-        e_u = m.u_air - ref.airspeed * math.cos(alpha)
+        e_u = m.u_air + gust - ref.airspeed * math.cos(alpha)
         # Gusts faster than the wind that attitude is corrected for must not be taken for angle of attack, nor below for
         # sideslip: with attitude uncorrected, feedback of w and v is feedback of path and course.
         e_w = (
@@ -159,6 +154,7 @@ class LandingController:
             elevator0
             + el_pull * q_ref
             - per_q * (ke_u * e_u + ke_w * e_w + ke_q * e_q + ke_th * e_th + ke_H * e_H + ke_iV * int_V + ke_iH * int_H)
+            - per_q * self._per_gust * gust
         )
         thrust = (
             thrust0

@@ -178,7 +178,8 @@ class CameraSettings:
 class GustSettings:
     """Elevator against the lift that a gust along the nose gives or takes, at airspeed_mps (as 1/V² elsewhere).
 
-    Tailwind that lasts longer than filter_s is left to the feedback.
+    What is faster than the wind smoothed over filter_s is a gust, answered so and by nothing else; airspeed less gusts is
+    what is fed back and what gains and trim are scheduled over.
     """
 
     elevator_deg_per_mps: float
@@ -252,6 +253,24 @@ class GearSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class HoldOffSettings:
+    """Near the ground a steady sink matters more than the place: from from_height_m down to to_height_m of the wheels the
+    share of a height error that is flown back falls from 1 to `share`."""
+
+    from_height_m: float
+    to_height_m: float
+    share: float
+
+    __pydantic_config__ = _STRICT
+
+    def __post_init__(self) -> None:
+        if not self.from_height_m > self.to_height_m >= 0.0:
+            raise ValueError("hold_off: from_height_m must be above to_height_m")
+        if not 0.0 < self.share <= 1.0:  # without any, it might float for ever
+            raise ValueError(f"hold_off: share must be above 0 and at most 1, not {self.share}")
+
+
+@dataclass(frozen=True, slots=True)
 class PathSettings:
     """Glide and flare of the main wheels: H = (flare_height + sink_height) exp(-s/L) - sink_height to touchdown_x."""
 
@@ -262,6 +281,8 @@ class PathSettings:
     approach_mps: float
     touchdown_mps: float
     height_error_limit_m: float  # larger deviations are flown back at this one's rate
+    hold_off: HoldOffSettings | None = None
+    turbulence_share: float = 0.0  # of the wind at 20 ft that goes with reported turbulence, added to touchdown_mps
 
     __pydantic_config__ = _STRICT
 
@@ -275,6 +296,8 @@ class PathSettings:
         )
         if self.approach_mps < self.touchdown_mps:
             raise ValueError("approach_mps must not be below touchdown_mps")
+        if self.turbulence_share < 0.0:
+            raise ValueError(f"turbulence_share must be 0 or more, not {self.turbulence_share}")
 
 
 @dataclass(frozen=True, slots=True)

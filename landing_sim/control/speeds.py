@@ -1,4 +1,4 @@
-"""How fast to approach: the rule from mass and headwind, and settings moved to the speed it gives."""
+"""How fast to approach and touch down: the rule from mass and headwind, settings moved to its speed, turbulence."""
 
 from __future__ import annotations
 
@@ -29,3 +29,13 @@ def at_speed(
     points = tuple(replace(p, airspeed_mps=factor * p.airspeed_mps) for p in control.trim_points)
     path = replace(guidance.path, approach_mps=airspeed, touchdown_mps=factor * guidance.path.touchdown_mps)
     return replace(control, trim_points=points), replace(guidance, path=path)
+
+
+def in_turbulence(wind_20ft: float, guidance: GuidanceSettings) -> GuidanceSettings:
+    """Guidance that keeps some of the approach's speed for a touchdown in turbulence (its wind at 20 ft [m/s]).
+
+    A gust of the same strength takes less lift the faster one flies, and leaves more margin over the stall.
+    """
+    path = guidance.path
+    touchdown = min(path.touchdown_mps + path.turbulence_share * wind_20ft, path.approach_mps)
+    return replace(guidance, path=replace(path, touchdown_mps=touchdown))

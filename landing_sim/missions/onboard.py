@@ -183,13 +183,13 @@ def _density(height: float, warmer: float) -> float:
 
 
 def prepared(scenario: Scenario, vehicle: Vehicle) -> Vehicle:
-    """The vehicle for this approach: a crew knows its mass and the steady headwind."""
+    """The vehicle for this approach: a crew knows its mass, the steady headwind and reported turbulence."""
     mass = vehicle.mass_kg if scenario.aircraft.mass_kg is None else scenario.aircraft.mass_kg
     glide = scenario.guidance.glide_deg
     if glide is not None:
         path = replace(vehicle.guidance.path, glide_deg=glide)
         vehicle = vehicle.model_copy(update={"guidance": replace(vehicle.guidance, path=path)})
-    return vehicle.prepared(mass, scenario.wind.headwind_mps, _air_density(scenario))
+    return vehicle.prepared(mass, scenario.wind.headwind_mps, _air_density(scenario), _reported_turbulence(scenario))
 
 
 def control_settings(scenario: Scenario, vehicle: Vehicle) -> ControlSettings:
