@@ -124,7 +124,11 @@ def test_rare_event_runs_are_shown(tmp_path: Path) -> None:
     plan = campaign(tmp_path, TEXT + CROSS + RISKS)
     fill(tmp_path / "out", plan, 60)
     results = store.read(tmp_path / "out")
-    found = Page(html(results, plan, tmp_path, {"hard": Bounds(1e-9, 3e-10, 4e-9)})).words
+    level = {"share": 0.1, "threshold": 1.0}
+    details = {"hard": {"probability": 1e-9, "lower": 3e-10, "upper": 4e-9, "reached": True, "levels": [level] * 9}}
+    details["hard"] |= {"evaluations": 8200, "seconds": 7000.0, "held": None}
+    found = Page(html(results, plan, tmp_path, {"hard": Bounds(1e-9, 3e-10, 4e-9)}, details)).words
+    assert "8,200" in found and "117 min" in found
     assert "by rare-event run" in found and "3.0·10⁻¹⁰ … 4.0·10⁻⁹" in found
     assert rare_landings.saved(tmp_path / "out", plan) == {}
 

@@ -27,12 +27,22 @@ MARKS = {word: mark for mark, word in WORDS.items()} | {part.SHORT[OPEN]: "OPEN"
 def report(folder: Path) -> Path:
     """Write `folder`/report.html from what has been flown there. Raises CampaignError where there is no campaign."""
     results, plan = store.read(folder), store.plan(folder)
-    write(html(results, plan, folder, rare_landings.saved(folder, plan)), folder / FILE)
+    rare, details = rare_landings.saved(folder, plan), rare_landings.details(folder, plan)
+    write(html(results, plan, folder, rare, details), folder / FILE)
     return folder / FILE
 
 
-def html(results: Results, plan: Plan, folder: Path, rare: Mapping[str, Bounds] | None = None) -> str:
-    """The page. Same results, same bytes."""
+def html(
+    results: Results,
+    plan: Plan,
+    folder: Path,
+    rare: Mapping[str, Bounds] | None = None,
+    details: Mapping[str, Mapping[str, Any]] | None = None,
+) -> str:
+    """The page. Same results, same bytes.
+
+    folder : as replay commands name it; rare, details : of rare-event runs, by the risks' names
+    """
     import jinja2
 
     campaign, columns, outcome = results.campaign, results.columns, results.outcome
@@ -46,6 +56,7 @@ def html(results: Results, plan: Plan, folder: Path, rare: Mapping[str, Bounds] 
     sections = [
         *part.bounds(rows),
         *part.over_sweep(swept, campaign),
+        *part.rare_events(details or {}),
         part.footprint(results, plan, rows),
         *part.distributions(rows, columns, use),
         part.worst(results, rows, use, folder),

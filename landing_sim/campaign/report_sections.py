@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -98,6 +99,34 @@ def over_sweep(swept: Sequence[verdict.Swept], campaign: Campaign) -> list[Secti
     last = ("PASS up to", *(held(one.largest_passing, campaign) for one in swept))
     lead = f"Every landing holds {sweep.path} at one of {len(values)} values. Bars: 95 % intervals, dashed: the risk."
     return [Section("Over the sweep", lead, figures, (Table(headings, (*lines, last)),))]
+
+
+def rare_events(details: Mapping[str, Mapping[str, Any]]) -> list[Section]:
+    """What rare-event runs found, and by how many landings."""
+    if not details:
+        return []
+    lines = []
+    for name, found in details.items():
+        levels, reached = found["levels"], found["reached"]
+        shares = " · ".join(number(level["share"]) for level in levels)
+        held = "" if found.get("held") is None else f" at {found['held']:g}"
+        lines.append(
+            (
+                name + held,
+                f"{found['probability']:.2g}" if reached else "not reached",
+                f"{found['lower']:.1g} … {found['upper']:.1g}",
+                shares,
+                f"{found['evaluations']:,}",
+                _duration(float(found.get("seconds") or 0.0)),
+            )
+        )
+    headings = ("risk", "probability", "95 %", "shares of the levels", "landings", "took")
+    lead = (
+        "Subset simulation: each level's landings start from the worst of the last one's and move every random number "
+        "behind them a little. The probability is the product of the shares."
+    )
+    table = Table(headings, tuple(lines), ("probability", "95 %", "landings", "took"))
+    return [Section("Rare-event runs", lead, tables=(table,))]
 
 
 def footprint(results: Results, plan: Plan, rows: Sequence[Judged]) -> Section:
