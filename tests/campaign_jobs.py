@@ -45,5 +45,10 @@ def no_worker(number: int) -> int:
     return number
 
 
+def whoami(number: int) -> int:
+    """The worker's process."""
+    return os.getpid()
+
+
 if os.environ.get("CAMPAIGN_TEST") == "broken":
     os._exit(7)

@@ -172,6 +172,11 @@ def test_the_pool_knows_whose_fault_it_was() -> None:
     assert {job: d.value for job, d in done.items()} == {n: n * n for n in range(12) if n != 7}
 
 
+def test_the_first_job_alone_in_a_worker_of_its_own() -> None:
+    done = {d.job: d.value for d in pool.run(campaign_jobs.whoami, range(20), 2, "fork", first_alone=True)}
+    assert done[0] not in [done[k] for k in range(1, 20)]
+
+
 @pytest.mark.slow
 def test_workers_that_never_begin_are_no_endless_loop(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CAMPAIGN_TEST", "broken")

@@ -134,6 +134,11 @@ WRONG = {
         "sweep: {path: wind.crosswind_mps, values: [10, 99], unit: kt}\n",
         r"c.yaml:3:15: wind.crosswind_mps: must be less than or equal to 30",
     ),
+    "sweep of what is derived": (
+        "variables: {a: {uniform: {low: 0, high: 1}}}\ndispersions: {wind.crosswind_mps: {derived: {of: a}}}\n"
+        "sweep: {path: wind.crosswind_mps, values: [1]}\n",
+        r"c.yaml:5:15: sweep.path: is set or derived as well",
+    ),
     "set and dispersed": (
         "set: {wind.crosswind_mps: 1}\ndispersions: {wind.crosswind_mps: {normal: {mean: 0, sd: 1}}}\n",
         r"c.yaml:4:35: dispersions.wind.crosswind_mps: stands under `set` as well",
@@ -318,6 +323,44 @@ def test_a_sweep_holds_its_values_in_turn(tmp_path: Path) -> None:
     plan = load(tmp_path, "sweep: {path: wind.crosswind_mps, values: [10, 20], unit: kt}\n")
     held = [draw(plan.campaign, run)["wind.crosswind_mps"] for run in range(3)]
     assert held == pytest.approx([5.1444, 10.2889, 5.1444], abs=1e-4)
+
+
+def test_what_is_dispersed_can_be_held_instead(tmp_path: Path) -> None:
+    text = """variables: {along_mps: {uniform: {low: 0, high: 10}}}
+dispersions:
+  wind.headwind_mps: {derived: {of: along_mps, scale: 2}}
+  wind.crosswind_mps: {uniform: {low: 0, high: 2}}
+"""
+    free = load(tmp_path, text).campaign
+    held = load(tmp_path, text + "sweep: {path: along_mps, values: [1, 3]}\n")
+    found = draw(held.campaign, 1)
+    assert (found["along_mps"], found["wind.headwind_mps"]) == (3.0, 6.0)
+    assert found["wind.crosswind_mps"] == draw(free, 1)["wind.crosswind_mps"]  # all else as ever
+    assert scenario_of(held, 1, found).wind.headwind_mps == 6.0
+    assert set(held.campaign.drawn()) == {"wind.crosswind_mps"}
+    assert held.campaign.names() == ["along_mps", "wind.headwind_mps", "wind.crosswind_mps"]
+    path = load(tmp_path, text + "sweep: {path: wind.crosswind_mps, values: [5]}\n")
+    assert scenario_of(path, 0, draw(path.campaign, 0)).wind.crosswind_mps == 5.0
+
+
+def test_each_variable_is_held_at_its_ends_to_find_the_worst(tmp_path: Path) -> None:
+    from landing_sim.campaign.worst import ends, holding
+
+    text = """dispersions:
+  wind.crosswind_mps: {uniform: {low: 0, high: 10, unit: kt}}
+  wind.headwind_mps: {normal: {mean: 1, sd: 2}}
+  filter.kind: {choice: {values: [augmented, plain]}}
+correlations: [{of: [wind.crosswind_mps, wind.headwind_mps], matrix: [[1, 0.5], [0.5, 1]]}]
+"""
+    plan = load(tmp_path, text)
+    low, high = ends(plan.campaign, "wind.crosswind_mps")
+    assert (low, high) == (pytest.approx(0.1 * 0.5144, rel=1e-3), pytest.approx(9.9 * 0.5144, rel=1e-3))
+    with pytest.raises(ValueError, match="words"):
+        ends(plan.campaign, "filter.kind")
+    held = holding(plan, "wind.crosswind_mps", (low, high), 3)
+    assert held.campaign.runs == 6
+    assert [draw(held.campaign, run)["wind.crosswind_mps"] for run in range(4)] == [low, high, low, high]
+    assert held.identity() != plan.identity()
 
 
 def test_other_noise_moves_everything(tmp_path: Path) -> None:

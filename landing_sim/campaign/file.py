@@ -55,9 +55,12 @@ class Risk(Section):
 
 
 class Sweep(Section):
-    """One value held in turn at each of several: landing k flies with values[k % n]. What a limit campaign does."""
+    """One value held in turn at each of several: landing k flies with values[k % n]. What a limit campaign does.
 
-    path: str = Field(description="path of the scenario's value")
+    Where it is dispersed as well, it is held instead.
+    """
+
+    path: str = Field(description="path of the scenario's value, or name of a variable")
     values: tuple[float, ...] = Field(min_length=1, max_length=1000, description="in the order they are tried")
     unit: Unit = None
     aim: float | None = Field(None, description="the one that the campaign's verdict is about; null = the last")
@@ -94,7 +97,17 @@ class Campaign(Section):
 
     def drawn(self) -> dict[str, Distribution]:
         """What takes a random number, by name or path; in the file's order, which is that of Sobol dimensions."""
-        return {name: d for name, d in self._all().items() if d.derived is None}
+        held = None if self.sweep is None else self.sweep.path
+        return {name: d for name, d in self._all().items() if d.derived is None and name != held}
+
+    def names(self) -> list[str]:
+        """Of all that is drawn, derived or held."""
+        held = [] if self.sweep is None or self.sweep.path in self._all() else [self.sweep.path]
+        return [*self._all(), *held]
+
+    def dispersed_paths(self) -> list[str]:
+        """Of the scenario's values that each landing has its own of."""
+        return [name for name in self.names() if name not in self.variables]
 
     def _all(self) -> dict[str, Distribution]:
         return {**self.variables, **self.dispersions}
@@ -215,8 +228,9 @@ def _names(campaign: Campaign) -> Iterator[Wrong]:
             met.add(name)
     sweep = campaign.sweep
     if sweep is not None:
-        if sweep.path in campaign.set or sweep.path in campaign.dispersions:
-            yield ("sweep", "path"), "is set or dispersed as well"
+        held = {**campaign.variables, **campaign.dispersions}.get(sweep.path)
+        if sweep.path in campaign.set or (held is not None and held.derived is not None):
+            yield ("sweep", "path"), "is set or derived as well"
         if sweep.aim is not None and sweep.aim not in sweep.values:
             yield ("sweep", "aim"), f"is none of values = {', '.join(f'{v:g}' for v in sweep.values)}"
         if len(set(sweep.values)) < len(sweep.values):
@@ -309,9 +323,10 @@ def _check(
     """The scenario for these normals. `raw` are values instead of quantiles, in the file's own units."""
     trial = copy.deepcopy(base)
     values = assemble(campaign, z, run, raw or {})
-    _put(trial, {path: values[path] for path in campaign.dispersions}, document, "dispersions")
-    if campaign.sweep is not None:
-        _put(trial, {campaign.sweep.path: values[campaign.sweep.path]}, document)
+    held = None if campaign.sweep is None else campaign.sweep.path
+    _put(trial, {path: values[path] for path in campaign.dispersions if path != held}, document, "dispersions")
+    if held is not None and held not in campaign.variables:
+        _put(trial, {held: values[held]}, document)
     try:
         return scenario.check(trial)
     except ConfigError as error:
@@ -331,16 +346,18 @@ def assemble(
     raw : values instead of quantiles, in the file's own units
     """
     values: dict[str, Any] = {}
+    sweep = campaign.sweep
+    if sweep is not None:
+        values[sweep.path] = sweep.values[run % len(sweep.values)] * factor(sweep.path, sweep.unit)
     for name, distribution in {**campaign.variables, **campaign.dispersions}.items():
+        if name in values:
+            continue
         if isinstance(distribution.kind, Derived):
             values[name] = derive(distribution.kind, values)
             continue
         value = raw[name] if raw and name in raw else quantile(distribution, z[name])
         scale = factor(name, distribution.unit)
         values[name] = value if scale == 1.0 else scale * value
-    if campaign.sweep is not None:
-        sweep = campaign.sweep
-        values[sweep.path] = sweep.values[run % len(sweep.values)] * factor(sweep.path, sweep.unit)
     return values
 
 

@@ -108,8 +108,7 @@ def scenario_of(plan: Plan, run: int, values: Mapping[str, Any], changes: Sequen
     """The scenario of a run. `landing-sim run` flies the same landing from it. Raises ConfigError."""
     source = f"run {run} of {plan.label}"
     document = yamlfile.Document(source, copy.deepcopy(dict(plan.scenario)))
-    sweep = plan.campaign.sweep
-    for path in (*plan.campaign.dispersions, *([] if sweep is None else [sweep.path])):
+    for path in plan.campaign.dispersed_paths():
         problem = config.assign(document, path.split("."), values[path], Mark(source))
         if problem is not None:
             raise ConfigError([problem])

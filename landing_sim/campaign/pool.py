@@ -74,7 +74,7 @@ def run(
 
     function : importable, as pickle wants it; runs in the workers
     method : how processes are started
-    first_alone : one worker until the first result is there: it fills caches on disk that others then share
+    first_alone : one worker until the first result is there: it fills caches on disk that others, started then, share
     preload : modules that forkserver workers find loaded
 
     Closing the iterator (or an interrupt inside it) ends the workers. Raises PoolError.
@@ -120,7 +120,10 @@ def run(
                     worker.ready, stillborn = True, 0
                     continue
                 (job,), worker.job = worker.job, None  # type: ignore[misc]
-                first_alone = False
+                if first_alone:  # compilers leave it 200 MB larger than who finds their work done
+                    crew.remove(worker)
+                    worker.stop()
+                    first_alone = False
                 yield Done(job, *answer)
     finally:
         for worker in crew:

@@ -55,7 +55,7 @@ class Store:
 
     def __init__(self, folder: Path, plan: Plan, figures: tuple[str, ...]) -> None:
         self.folder, self._figures = folder, figures
-        self._values = tuple(_value_names(plan.campaign))
+        self._values = tuple(plan.campaign.names())
         _check_folder(folder)
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -220,11 +220,6 @@ def _meta(db: sqlite3.Connection) -> dict[str, Any]:
     if not db.execute("SELECT name FROM sqlite_master WHERE name = 'campaign'").fetchone():
         return {}
     return {key: json.loads(value) for key, value in db.execute("SELECT key, value FROM campaign")}
-
-
-def _value_names(campaign: Campaign) -> list[str]:
-    sweep = [] if campaign.sweep is None else [campaign.sweep.path]
-    return [*campaign.variables, *campaign.dispersions, *sweep]
 
 
 def _floats(cells: tuple[Any, ...], choice: tuple[Any, ...] | None) -> Array:

@@ -1,0 +1,43 @@
+"""Which variable is worst: every one that a campaign disperses is held at its 1st and 99th percentile in turn.
+
+usage: tools/worst CAMPAIGN [--landings N] [--variable NAME]... [--workers N] [--out DIR]
+
+Flies N landings at each end of each variable into DIR/VARIABLE (out/NAME-worst if left out; the same command goes on), and
+prints for each risk where it came nearest: events, and how many standard deviations the metric's mean is from the limit.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from landing_sim.campaign import file
+from landing_sim.campaign.worst import Held, worst
+
+
+def show(held: Held) -> None:
+    print(f"  {held.name} = {held.value:.4g}: {held.count} of {held.n}, {held.sigmas:.1f} sigma from the limit")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("campaign")
+    parser.add_argument("--landings", type=int, default=50, help="at each end of each variable")
+    parser.add_argument("--variable", action="append", help="drawn name or path; all if left out")
+    parser.add_argument("--workers", type=int)
+    parser.add_argument("--out", type=Path)
+    args = parser.parse_args()
+    plan = file.load(args.campaign)
+    unknown = set(args.variable or []) - set(plan.campaign.drawn())
+    if unknown:
+        parser.error(f"not drawn: {', '.join(sorted(unknown))}; there are: {', '.join(plan.campaign.drawn())}")
+    folder = args.out or Path("out") / f"{plan.campaign.name}-worst"
+    found = worst(plan, folder, args.landings, args.variable, args.workers)
+    for risk in plan.campaign.risks:
+        print(f"{risk.name}: {risk.metric}")
+        for held in [h for h in found if h.risk == risk.name][:5]:
+            show(held)
+
+
+if __name__ == "__main__":
+    main()
