@@ -230,7 +230,7 @@ def measure(wanted: argparse.Namespace, say: Callable[[str], None]) -> dict[str,
         if wanted.bound:
             figures["bound"] = bound.beside(SCENARIO[name], wanted.set, wanted.bound, say)
         if wanted.many:
-            figures["many"] = many.many(SCENARIO[name], bench.craft, wanted.many, say)
+            figures["many"] = many.apart(SCENARIO[name], wanted.many)
     say("start-up")
     out["imports"] = startup.imports(wanted.repeats)
     for name in names if "first" not in wanted.skip else ():

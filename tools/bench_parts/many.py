@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from statistics import median
 
 import numpy as np
 
 from bench_parts.flights import land
 from bench_parts.startup import resident_mb
+from landing_sim import vehicle as vehicles
 from landing_sim.scenario import load
-from landing_sim.vehicle import Vehicle
 
 
-def many(scenario: str, vehicle: Vehicle, count: int, say: Callable[[str], None]) -> dict[str, float]:
+def apart(scenario: str, count: int) -> dict[str, float]:
+    """`many` in a process of its own, whose memory nothing else has been in."""
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as process:
+        return process.submit(many, scenario, count).result()
+
+
+def many(scenario: str, count: int) -> dict[str, float]:
     """Land `count` times, seeds 1, 2, ...; CPU a landing is building and flying.
 
     The single-run figure is the median of seed 1 flown every tenth time between the others, so that a machine that is
     getting slower is not mistaken for a simulator that is.
     """
     wanted = load(scenario)
+    vehicle = vehicles.load(wanted.aircraft.model)
     land(wanted, vehicle)  # compiled code and designs are made
     gc.collect()
     cpu, single, memory = [], [], []
@@ -30,7 +39,7 @@ def many(scenario: str, vehicle: Vehicle, count: int, say: Callable[[str], None]
             single.append(alone.setup.cpu + alone.flight.cpu)
             gc.collect()
             memory.append(resident_mb())
-            say(f"{k} landings, {memory[-1]:.1f} MB")
+            print(f"{scenario}: {k} landings, {memory[-1]:.1f} MB", file=sys.stderr, flush=True)
         flown = land(load(scenario, [f"seed={k + 1}"]), vehicle)
         cpu.append(flown.setup.cpu + flown.flight.cpu)
     gc.collect()
