@@ -17,6 +17,7 @@ from landing_sim.estimators.optic_flow.estimator import NAMES, ContactFrontEnd, 
 from landing_sim.estimators.optic_flow.geometry import flow
 from landing_sim.estimators.optic_flow.kalman import FlowEkf
 from landing_sim.estimators.optic_flow.reference import reference
+from landing_sim.missions import lunar_flight
 from landing_sim.missions.lunar_landing import build, deviation
 from landing_sim.sections.lunar import Deviation, LunarScenario
 from landing_sim.sensors.optic_flow import FlowReading
@@ -196,3 +197,19 @@ def test_lands_softly_on_several_moons() -> None:
         assert touch.sink_rate <= 2.0 and touch.groundspeed <= 1.0
         assert math.hypot(touch.pitch, touch.bank) <= math.radians(10.0)
         assert last.truth.thrust == 0.0 and np.linalg.norm(last.truth.v_RB_R) < 0.1
+
+
+def test_a_flight_becomes_a_log_a_verdict_and_a_recording(tmp_path) -> None:
+    """Cut off after 0.6 s: not landed, nothing judged as met, but everything written down."""
+    short = scenario(terrain={"flat": True}, time={"limit_s": 0.6}, record={"frames_hz": 2.0})
+    flight = lunar_flight.fly(short, recording=tmp_path / "recording.rrd")
+    assert flight.verdict.outcome == "timeout" and not flight.verdict.passed
+    assert [c.passed for c in flight.verdict.criteria] == [False, False, False]
+    log = flight.log
+    assert log["true_flow_x"][0] == pytest.approx(math.radians(2.18 - 0.115), rel=1e-6)
+    assert log.error("theta")[0] == pytest.approx(math.radians(-5.23), abs=1e-4)  # nose up outside
+    sight = np.column_stack([log[f"sight_1_{axis}_m"] for axis in "xyz"])[5]
+    p = np.array([log["true_x_m"][5], log["true_y_m"][5], log["true_z_m"][5]])
+    below = math.atan2(sight[2] - p[2], sight[0] - p[0])  # the first sensor looks 90 deg below the body's horizontal
+    assert math.degrees(below) == pytest.approx(90.0 - math.degrees(log["true_theta_rad"][5]), abs=0.1)
+    assert (tmp_path / "recording.rrd").stat().st_size > 100_000

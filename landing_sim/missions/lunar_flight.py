@@ -11,17 +11,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from landing_sim.errors import Mark, Problem, ScenarioError
+from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.interfaces import NoiseStream
-from landing_sim.missions.lunar_landing import build
+from landing_sim.missions.lunar_landing import Mission, build
 from landing_sim.plants.jsbsim import PlantError
 from landing_sim.record import judge, log
 from landing_sim.sections.lunar import LunarScenario
 from landing_sim.sensors.optic_flow import FlowReading
+from landing_sim.sensors.optic_flow_picture import picture
 from landing_sim.signals import Step
 
 if TYPE_CHECKING:
+    from landing_sim.record.lunar_replay import LunarScene
     from landing_sim.runner import Flight
 
+PICTURE = (320, 240, 280.0)  # width, height, focal length [px] of a recording's camera
 JUDGED_FROM = 5.0  # [s] errors before are the first guess's
 ERRORS = {"H": (1.0, "m"), "q": (math.degrees(1.0), "deg/s"), "theta": (math.degrees(1.0), "deg")}
 FLOWS = {"flow_x": (math.degrees(1.0), "deg/s"), "flow_z": (math.degrees(1.0), "deg/s")}
@@ -43,11 +47,21 @@ def fly(
     except (PlantError, ValueError) as error:
         raise ScenarioError([Problem(Mark(scenario.name), (), f"cannot be flown: {error}")]) from error
     builder, readings = log.LogBuilder(), []
+    recorder, due = None, 0.0
+    camera = Intrinsics.centred(*PICTURE)
+    if recording is not None:
+        from landing_sim.record.lunar_replay import LunarRecorder
+
+        recorder = LunarRecorder(recording, scene(scenario, mission), live)
     for step in mission.steps():
         builder.add(step)
         readings.append({s.sensor: s.data for s in step.samples if isinstance(s.data, FlowReading)})
         if watch is not None:
             watch(step)
+        if recorder is not None and scenario.record.frames_hz > 0.0 and step.truth.t >= due - 1e-9:
+            due = step.truth.t + 1.0 / scenario.record.frames_hz
+            seen = picture(mission.terrain, camera, step.camera.p_RC, step.camera.R_CR)
+            recorder.picture(step.truth.t, seen, step.camera.p_RC, step.camera.R_CR)
     outcome = mission.outcome()
     flown = builder.finish(
         scenario=scenario.model_dump(mode="json"),
@@ -57,7 +71,24 @@ def fly(
         extra={"reason": outcome.reason} if outcome.reason else None,
     )
     _add_flows(flown, readings, len(scenario.sensors.angles_deg))
+    if recorder is not None:
+        recorder.close(flown)
     return runner.Flight(flown, verdict(flown, scenario), time.perf_counter() - started)
+
+
+def scene(scenario: LunarScenario, mission: Mission) -> LunarScene:
+    """What stands still in a recording."""
+    from landing_sim.record.lunar_replay import LunarScene
+
+    ground = mission.terrain.layers[0]
+    return LunarScene(
+        heights=ground.heights,
+        light=ground.light[0],
+        cell=ground.cell,
+        angles=tuple(math.radians(a) for a in scenario.sensors.angles_deg),
+        camera=PICTURE,
+        title=f"{scenario.name}, seed {scenario.seed}",
+    )
 
 
 def _add_flows(flown: log.FlightLog, readings: list[dict[str, FlowReading]], count: int) -> None:

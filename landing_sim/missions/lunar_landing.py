@@ -14,7 +14,7 @@ from landing_sim.estimators.optic_flow.contract import FlowObserver
 from landing_sim.estimators.optic_flow.dynamics import Lander
 from landing_sim.estimators.optic_flow.estimator import ContactFrontEnd, FlowEstimator, FlowFrontEnd
 from landing_sim.estimators.optic_flow.kalman import FlowEkf, FlowUkf, Spreads
-from landing_sim.estimators.optic_flow.lpv_observer import LpvObserver
+from landing_sim.estimators.optic_flow.lpv_observer import SPARSE, LpvObserver
 from landing_sim.estimators.optic_flow.reference import Reference, reference
 from landing_sim.interfaces import Controller, Estimator, FrontEnd, Guidance, NoiseStream, Sensor
 from landing_sim.missions.runway_landing import Outcome
@@ -173,7 +173,7 @@ def _start(plan: Reference, off: Deviation) -> Start:
 def _observer(scenario: LunarScenario, plan: Reference) -> FlowObserver:
     lander: Lander = plan.lander
     if scenario.filter.kind == "lpv":
-        return LpvObserver(plan, spread=Spreads().first)
+        return LpvObserver(plan, SPARSE, Spreads().first)
     return FlowEkf(lander) if scenario.filter.kind == "ekf" else FlowUkf(lander)
 
 

@@ -74,6 +74,12 @@ class Descent(Section):
     patience_s: NotNegative = Field(4.0, description="before the estimate is flown")
 
 
+class Pictures(Section):
+    """What is written down."""
+
+    frames_hz: NotNegative = Field(0.5, description="camera images in the recording, per second; 0 = none")
+
+
 class Limits(Section):
     """What makes it a landing: at the first foot's touch."""
 
@@ -100,6 +106,7 @@ class LunarScenario(Section):
     sensors: Eyes = Field(Eyes(), description="the only ones")
     filter: Observer = Field(Observer(), description="estimator")
     control: Descent = Field(Descent(), description="guidance and control")
+    record: Pictures = Field(Pictures(), description="outputs")
     criteria: Limits = Field(Limits(), description="what makes it pass")
 
     @model_validator(mode="after")

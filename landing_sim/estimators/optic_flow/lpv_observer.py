@@ -38,6 +38,8 @@ class Gains:
 
 PUBLISHED = Gains((20.0, 0.05, 20.0, 20.0, 0.3), (1.0, 0.2, 1.0, 1.0, 0.2))
 SHIPPED = Gains((0.2, 0.05, 5.0, 5.0, 0.3), (1e-3, 1.0, 1.0, 1.0, 1.0))
+SPARSE = Gains((0.2, 0.05, 1.0, 1.0, 0.3), (1e-3, 1.0, 1.0, 1.0, 1.0))
+"""For looks of a few a second: nothing may be forgotten before the next one comes."""
 
 
 @dataclass(frozen=True, slots=True)
