@@ -31,7 +31,10 @@ ALLOWED_OURS = {
     **{part: ANYONE | TRUTH | {"interfaces"} for part in TRUTH},
     **{part: ANYONE | ONBOARD | {"interfaces"} for part in ONBOARD},
 }
-ONLY_IN = {"jsbsim": {"plants/jsbsim.py", "plants/jsbsim_lander.py"}, "rerun": {"record/replay.py", "record/stage.py"}}
+ONLY_IN = {
+    "jsbsim": {"plants/jsbsim.py", "plants/jsbsim_lander.py"},
+    "rerun": {"record/replay.py", "record/stage.py", "record/lunar_replay.py"},
+}
 
 
 def modules() -> list[Path]:

@@ -235,7 +235,7 @@ def _lander() -> tuple[np.ndarray, np.ndarray]:
                 )
             triangles.extend([(start, start + 1, start + 2), (start, start + 2, start + 3)])
 
-    frustum(-0.9, -0.9, 0.0, 0.9)
+    frustum(-0.9, -0.9, 0.01, 0.9)
     frustum(-0.9, 0.4, 0.9, 1.1)
     frustum(0.4, 0.9, 0.15, 0.45)
     for angle in (0.0, 2.0 * math.pi / 3.0, 4.0 * math.pi / 3.0):
