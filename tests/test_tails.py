@@ -99,6 +99,16 @@ def test_both_sides() -> None:
     assert down.tails[0].threshold < 0 and exceedance(-x, 3.0).probability == pytest.approx(down.probability)
 
 
+def test_interval_lies_around_the_estimate() -> None:
+    """Near the threshold, where counting is nearly all there is to it: as wide as a count of its excesses."""
+    x = stats.t(3).rvs(4000, random_state=np.random.default_rng(10))
+    result = exceedance(x, stats.t(3).isf(0.02))
+    assert result.probability == pytest.approx(0.02, rel=0.2)
+    assert math.sqrt(result.lower * result.upper) == pytest.approx(result.probability, rel=0.06)
+    excesses = result.tails[0].excesses
+    assert math.log(result.upper / result.lower) == pytest.approx(2 * 1.96 / math.sqrt(excesses), rel=0.35)
+
+
 def test_goodness_of_fit() -> None:
     """Passes a normal's tail about 95 times in 100, finds a lump of landings that belong to something else."""
     rng = np.random.default_rng(6)
