@@ -96,9 +96,10 @@ def simulate(
                 sample = sensor.sense(truth, camera)
                 if sample is not None:
                     in_flight.append(sample)
-        arrived = tuple(s for s in in_flight if s.t_arrival <= t + 1e-9)
+        now = t + 1e-9
+        arrived = tuple([s for s in in_flight if s.t_arrival <= now])
         if arrived:
-            in_flight = [s for s in in_flight if s.t_arrival > t + 1e-9]
+            in_flight = [s for s in in_flight if s.t_arrival > now]
 
         # the onboard side
         memory = estimator.predict(memory, acting, t)

@@ -99,8 +99,8 @@ class Renderer:
         v_RC_R (3,) [m/s] and w_RC_C (3,) [rad/s], the camera's own motion, are needed if exposure > 0 and unused if
         not. Raises ValueError for a pose that is not finite, or a missing motion.
         """
-        # One sum is finite only if every term is: cheaper than two reductions over small arrays.
-        if not math.isfinite(float(p_RC.sum() + R_CR.sum())):
+        # One sum is finite only if every term is; a dozen floats are added sooner than numpy has begun.
+        if not math.isfinite(sum(p_RC.tolist()) + sum(R_CR.ravel().tolist())):
             raise ValueError(f"camera pose is not finite: p_RC {p_RC}, R_CR {R_CR.tolist()}")
         if self.optics.exposure == 0.0:
             return RenderedFrame(self, ((p_RC.copy(), R_CR.copy()),), index)
