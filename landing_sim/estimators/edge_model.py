@@ -17,8 +17,8 @@ import math
 import numpy as np
 
 from landing_sim.estimators.states import EPAN, ETILT, JPAN, JTILT, PHI, PSI, THETA, WIDTH, H, X, Y
-from landing_sim.geometry.runway_image import EARTH_RADIUS, HORIZON, LEFT, RIGHT, THRESHOLD, horizon_dip, plane_normal
-from landing_sim.geometry.so3 import camera_from_body, from_euler
+from landing_sim.geometry.runway_image import EARTH_RADIUS, HORIZON, LEFT, RIGHT, THRESHOLD, horizon_dip, plane
+from landing_sim.geometry.so3 import camera_from_body, from_euler, product, turned
 from landing_sim.jit import kernel
 from landing_sim.types import Array
 
@@ -48,13 +48,10 @@ def edge_model(
     R_RB = from_euler(phi, theta, psi)
     true_pan = pan - x[EPAN] - x[JPAN]
     R_CB = camera_from_body(true_pan, tilt - x[ETILT] - x[JTILT])
-    R_CR = R_CB @ R_RB.T
-    p_RC = np.empty(3)
-    for k in range(3):
-        p_RC[k] = R_RB[k, 0] * lever[0] + R_RB[k, 1] * lever[1] + R_RB[k, 2] * lever[2]
-    p_RC[0] += x[X]
-    p_RC[1] += x[Y]
-    p_RC[2] -= x[H]
+    R_BR = R_RB.T.copy()
+    R_CR = product(R_CB, R_BR)
+    p_RC, arm = np.empty(3), turned(R_RB, lever[0], lever[1], lever[2])
+    p_RC[0], p_RC[1], p_RC[2] = arm[0] + x[X], arm[1] + x[Y], arm[2] - x[H]
     cph, sph, cth, sth = math.cos(phi), math.sin(phi), math.cos(theta), math.sin(theta)
     # axes in B about which phi, theta, psi turn the body, then pan and tilt the camera
     axes = np.zeros((5, 3))
@@ -64,7 +61,9 @@ def edge_model(
     axes[3, 2] = -1.0  # true pan = reading - errors
     axes[4, 0], axes[4, 1] = math.sin(true_pan), -math.cos(true_pan)
 
-    Hx[:, :] = 0.0
+    for i in range(Hx.shape[0]):
+        for k in range(Hx.shape[1]):
+            Hx[i, k] = 0.0
     ray = np.empty(3)
     rho_R = np.empty(3)
     g = np.empty(3)
@@ -76,8 +75,8 @@ def edge_model(
             dx = R_CR[0, 0] * ray[0] + R_CR[1, 0] * ray[1] + R_CR[2, 0]
             dy = R_CR[0, 1] * ray[0] + R_CR[1, 1] * ray[1] + R_CR[2, 1]
             azimuth = math.atan2(dy, dx)
-        n = plane_normal(kind, p_RC, x[WIDTH], slope, azimuth)
-        m = R_CR @ n
+        n = plane(kind, p_RC, x[WIDTH], slope, azimuth)
+        m = turned(R_CR, n[0], n[1], n[2])
         den = (m[0] * direction[i, 0] + m[1] * direction[i, 1]) / f
         if den == 0.0:
             h[i] = math.inf
@@ -88,7 +87,7 @@ def edge_model(
         for k in range(3):
             rho_R[k] = R_CR[0, k] * rho_x + R_CR[1, k] * rho_y + R_CR[2, k]
         # gradient of (dm . rho) with respect to the camera's position: n = (P - C) x d
-        g[:] = 0.0
+        g[0] = g[1] = g[2] = 0.0
         if kind == HORIZON:
             height = -p_RC[2]
             dip = horizon_dip(height)
@@ -108,9 +107,9 @@ def edge_model(
             elif kind == RIGHT:
                 Hx[i, WIDTH] = -0.5 * g[1]
         Hx[i, X], Hx[i, Y], Hx[i, H] = g[0], g[1], -g[2]
-        n_B = R_RB.T @ n
-        rho_B = R_RB.T @ rho_R
-        g_B = R_RB.T @ g
+        n_B = turned(R_BR, n[0], n[1], n[2])
+        rho_B = turned(R_BR, rho_R[0], rho_R[1], rho_R[2])
+        g_B = turned(R_BR, g[0], g[1], g[2])
         t0 = rho_B[1] * n_B[2] - rho_B[2] * n_B[1]
         t1 = rho_B[2] * n_B[0] - rho_B[0] * n_B[2]
         t2 = rho_B[0] * n_B[1] - rho_B[1] * n_B[0]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from landing_sim.estimators.states import BP, PHI, WX, N, P, U
-from landing_sim.geometry.so3 import from_euler
+from landing_sim.geometry.so3 import from_euler, turned
 from landing_sim.jit import kernel
 from landing_sim.types import Array
 
@@ -29,7 +29,7 @@ def airspeed_model(x: Array, z: float) -> tuple[Array, Array]:
     """Innovation (1,) and H (1, 26) of z = |u - R_BR w|."""
     Hx = np.zeros((1, N))
     R = from_euler(x[PHI], x[PHI + 1], x[PHI + 2])
-    wB = R.T @ x[WX : WX + 3]
+    wB = turned(R.T.copy(), x[WX], x[WX + 1], x[WX + 2])
     a = np.empty(3)
     V2 = 0.0
     for i in range(3):
