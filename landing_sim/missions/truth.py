@@ -105,6 +105,22 @@ def wind(scenario: Scenario, noise: NoiseStream) -> Wind:
     return Wind(config, noise, scenario.runway.slope_percent / 100.0)
 
 
+def heading(scenario: Scenario, vehicle: Vehicle) -> float:
+    """[rad] at the start: as wanted, or crabbed so that the steady wind does not blow it off the landing direction."""
+    start = scenario.initial
+    if start.heading_deg is not None:
+        return math.radians(start.heading_deg)
+    airspeed = _airspeed(scenario, vehicle)
+    across = _steady(scenario.wind).velocity(0.0, start.x_m, start.y_m, start.height_m, airspeed)[1]
+    return -math.asin(min(max(across / airspeed, -1.0), 1.0))
+
+
+def _airspeed(scenario: Scenario, vehicle: Vehicle) -> float:
+    """[m/s] true, at the start."""
+    wanted = scenario.initial.airspeed_mps
+    return vehicle.guidance.path.approach_mps if wanted is None else wanted
+
+
 def platform(scenario: Scenario, vehicle: Vehicle, noise: NoiseStream) -> PanTilt | Strapdown:
     """The camera mount: bolted down, or turned by an operator to where the runway is thought to be."""
     if vehicle.camera.fixed_tilt_deg is not None:
@@ -117,7 +133,7 @@ def platform(scenario: Scenario, vehicle: Vehicle, noise: NoiseStream) -> PanTil
         pan_limit=math.radians(vehicle.camera.pan_limit_deg),
         tilt_limit=math.radians(vehicle.camera.tilt_limit_deg),
         stabilisation=p.stabilisation,
-        pan=-math.radians(start.heading_deg) + float(off[0]),
+        pan=-heading(scenario, vehicle) + float(off[0]),
         tilt=-math.radians(start.flight_path_deg) + float(off[1]),
     )
 
@@ -125,7 +141,6 @@ def platform(scenario: Scenario, vehicle: Vehicle, noise: NoiseStream) -> PanTil
 def plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt | Strapdown, wind: Wind) -> JsbsimPlant:
     """The aircraft in trim at its start."""
     a, s, r = scenario.aircraft, scenario.initial, scenario.runway
-    airspeed = vehicle.guidance.path.approach_mps if s.airspeed_mps is None else s.airspeed_mps
     frame = RunwayFrame(
         math.radians(r.latitude_deg), math.radians(r.longitude_deg), r.elevation_m, math.radians(r.heading_deg)
     )
@@ -133,8 +148,8 @@ def plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt | Strapdown, w
         x=s.x_m,
         y=s.y_m,
         height=s.height_m,
-        psi=math.radians(s.heading_deg),
-        airspeed=airspeed,
+        psi=heading(scenario, vehicle),
+        airspeed=_airspeed(scenario, vehicle),
         gamma=math.radians(s.flight_path_deg),
         flap=vehicle.control.flap if a.flap is None else a.flap,
         mass=a.mass_kg,
@@ -147,7 +162,7 @@ def plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt | Strapdown, w
         initial,
         math.atan(r.slope_percent / 100.0),
         scenario.time.step_s,
-        wind.wind(0.0, s.x_m, s.y_m, s.height_m, airspeed),
+        wind.wind(0.0, s.x_m, s.y_m, s.height_m, _airspeed(scenario, vehicle)),
         platform,
         np.array(vehicle.camera.p_BC_m),
     )

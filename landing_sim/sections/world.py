@@ -39,7 +39,12 @@ class Initial(Section):
     )
     y_m: float = Field(-85.0, ge=-5000, le=5000, description="cg right of the centreline")
     height_m: float = Field(51.0, gt=0, le=3000, description="cg above the threshold")
-    heading_deg: float = Field(15.0, gt=-180, le=180, description="nose right (+) of the landing direction")
+    heading_deg: float | None = Field(
+        15.0,
+        gt=-180,
+        le=180,
+        description="nose right (+) of the landing direction; null = into the steady wind as far as it takes to track it",
+    )
     airspeed_mps: Positive | None = Field(50.0, description="true airspeed; null = the vehicle's approach speed")
     flight_path_deg: float = Field(-3.0, ge=-15, le=15, description="air-relative flight path angle, climb positive")
 
