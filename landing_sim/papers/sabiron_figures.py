@@ -10,6 +10,7 @@ import numpy as np
 from landing_sim.estimators.optic_flow.geometry import outputs
 from landing_sim.papers import sabiron_2014 as s
 from landing_sim.papers.drawing import CLAIM, ESTIMATED, OTHER, TRUE, Figure, svg
+from landing_sim.papers.sabiron_flown_figures import figures as flown_figures
 from landing_sim.papers.sabiron_trials import OPEN_LOOP, UNITS, Course, Trial
 
 Results = Mapping[Any, Any]
@@ -25,7 +26,8 @@ LIMITS = {2: (0.5, 5.0), 3: (-9.0, 1.0), 4: (-62.0, -10.0), 0: (0.0, 2000.0), 1:
 
 def figures(results: Results) -> list[Figure]:
     """In the paper's order; `results` from Trial to courses."""
-    return [_states(results), _rest(results), _outputs(results), _errors(results), _noise(results)]
+    computed = [_states(results), _rest(results), _outputs(results), _errors(results), _noise(results)]
+    return [*computed, *flown_figures(results)]
 
 
 def _first(results: Results, trial: Trial) -> Course:
