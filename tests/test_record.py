@@ -422,6 +422,34 @@ def test_recording_shows_what_it_should(recording):
     assert sum(b.num_rows for b in images) == 12  # 6 s at 2 Hz
 
 
+def test_recorded_overlays_belong_to_their_image(recording):
+    """Whatever is sent together, each image keeps its own edges and windows, and a window the colour of its status."""
+
+    def rows(entity: str, column: str) -> list:
+        found = [b for b in chunks(recording[0])[f"/world/camera/image/{entity}"] if "time" in b.schema.names]
+        return [row.as_py() for b in found for row in b[f"LineStrips2D:{column}"]]
+
+    due = [0.0]
+    shown = []
+    for step in synthetic.fly(duration=6.0):  # at 2 Hz, from when an image was due
+        if step.truth.t >= due[-1] - 1e-9:
+            due.append(due[-1] + 0.5)
+            shown.append(step)
+    assert len(rows("windows", "strips")) == len(shown) == 12
+    looked = zip(shown, rows("measured", "strips"), rows("windows", "strips"), rows("windows", "colors"))
+    for step, measured, windows, colours in looked:
+        geometry, z = step.measurements[0].geometry, step.measurements[0].z
+        np.testing.assert_allclose(measured, overlay.measured_edges(geometry, z).ends, atol=1e-3)
+        np.testing.assert_allclose(windows, overlay.window_boxes(geometry), atol=1e-3)
+        wanted = [overlay.STATUS_COLOURS[Status(s)] for s in step.residuals.status]
+        assert [tuple(colour.to_bytes(4, "big")[:3]) for colour in colours] == wanted
+    known = [step for step in shown if step.estimate.valid]
+    for step, predicted in zip(known, rows("predicted", "strips"), strict=True):
+        sample = overlay.camera_sample(step.samples)[1]
+        lines = overlay.predicted_edges(step.estimate, sample.pan, sample.tilt, CAMERA)
+        np.testing.assert_allclose(predicted, lines.ends, atol=1e-3)
+
+
 def test_recorded_error_and_band_are_the_log_s(recording):
     path, log = recording
     rows = [

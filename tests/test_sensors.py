@@ -417,3 +417,12 @@ def test_the_real_camera_can_fail() -> None:
         assert stuck[k].data.pan == healthy[k].data.pan != healthy[0].data.pan
         assert garbage[k].data.frame.full().shape == first.shape == (64, 96)
         assert garbage[k].data.frame.full().std() > 60.0  # uniform: 73.9
+
+
+def test_normals_are_the_same_however_they_are_asked_for() -> None:
+    """Drawn by the block inside; what is handed out is the stream, without gaps and without repeats."""
+    sizes = [3, 1, 2, 60, 5, 200, 1, 64, 7]
+    pieces = Noise(3, "gyro", 2)
+    whole = Noise(3, "gyro", 2).normal(sum(sizes))
+    np.testing.assert_array_equal(np.concatenate([pieces.normal(size) for size in sizes]), whole)
+    assert len(np.unique(whole)) == len(whole)
