@@ -81,6 +81,19 @@ def test_a_flow_moves_the_estimate_towards_it_and_contact_stops_it() -> None:
     assert e.read(later).flags["on_ground"] and (later.state.X == landed.state.X).all() and later.state.t == 5.0
 
 
+def test_an_old_flow_is_brought_up_to_date() -> None:
+    """What was true 0.4 s ago teaches a filter that knows the truth nothing new; taken for today's, it would."""
+    e = estimator()
+    memory = e.predict(e.init(0.0), Command(throttle=0.55, elevator=0.1), 0.2)
+    then = memory.state.X
+    memory = e.predict(memory, Command(throttle=0.55, elevator=0.1), 0.6)
+    z, R = np.array([1.8, flow(then, 1.8)]), np.array([0.0, 1e-8])
+    old = e.update(memory, Measurement("flow", 0.2, 0.6, z, R))
+    new = e.update(memory, Measurement("flow", 0.6, 0.6, z, R))
+    change = [abs(flow(m.state.X, 1.8) - flow(memory.state.X, 1.8)) for m in (old, new)]
+    assert change[0] < 1e-6 < 1e-3 < change[1]
+
+
 def test_front_ends() -> None:
     reading = FlowReading(1.6, (math.radians(3.0), math.radians(0.4)), (9.9, 9.95), (0.0, 0.0, 0.0))
     (only,) = FlowFrontEnd("flow_1", 1.57).process(

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from landing_sim.estimators.optic_flow.contract import FlowObserver, FlowState, Push
-from landing_sim.estimators.optic_flow.dynamics import Lander
+from landing_sim.estimators.optic_flow.dynamics import Lander, advance
+from landing_sim.estimators.optic_flow.geometry import flow
 from landing_sim.estimators.optic_flow.lpv import SCALE
 from landing_sim.signals import Command, Estimate, Measurement, Sample
 from landing_sim.types import Array
@@ -23,12 +24,16 @@ _SIGNS = np.array([1.0, -1.0, 1.0, 1.0, -1.0])
 STRIDE = 0.02  # [s] longest step of a prediction
 
 
+REST = Push(0.0, 0.0)
+
+
 @dataclass(frozen=True, slots=True)
 class FlowMemory:
-    """What the observer knows, the mass left, and whether a foot has touched: nothing moves any more then."""
+    """What the observer knows, the mass left, what pushed last, and whether a foot has touched: nothing moves then."""
 
     state: FlowState
     mass: float  # [kg] by what was commanded
+    push: Push = REST
     on_ground: bool = False
 
 
@@ -60,22 +65,28 @@ class FlowEstimator:
         state, mass, step = memory.state, memory.mass, dt / count
         for _ in range(count):
             mass -= step * self.lander.burn(thrust, attitude)
-            state = self.observer.predict(state, Push(thrust / mass, self.lander.agility * attitude), step)
-        return FlowMemory(replace(state, t=t), mass)
+            push = Push(thrust / mass, self.lander.agility * attitude)
+            state = self.observer.predict(state, push, step)
+        return FlowMemory(replace(state, t=t), mass, push)
 
     def update(self, memory: FlowMemory, measurement: Measurement) -> FlowMemory:
-        """Kinds "flow": z (2,) alpha, omega; R (2,) of which the second is omega's variance; "on_ground": z (1,)."""
+        """Kinds "flow": z (2,) alpha, omega; R (2,) of which the second is omega's variance; "on_ground": z (1,).
+
+        A flow is as old as half the edge's passage, some tenths of a second: what eq. (2) makes of it meanwhile is added.
+        """
         if measurement.kind == "on_ground":
             return replace(memory, on_ground=memory.on_ground or bool(measurement.z[0] > 0.5))
         if measurement.kind != "flow":
             raise ValueError(f"a flow estimator knows no measurement {measurement.kind!r}")
-        alpha, flow = measurement.z
-        return replace(
-            memory, state=self.observer.look(memory.state, float(alpha), float(flow), math.sqrt(measurement.R[1]))
-        )
+        alpha, seen = measurement.z.tolist()
+        state, push, age = memory.state, memory.push, memory.state.t - measurement.t_valid
+        if age > 1e-6:
+            then = advance(state.X, push.a, push.spin, self.lander.gravity, -age)
+            seen += flow(state.X, alpha) - flow(then, alpha)
+        return replace(memory, state=self.observer.look(state, alpha, seen, math.sqrt(measurement.R[1])))
 
     def read(self, memory: FlowMemory, t: float | None = None) -> Estimate:
-        """The estimate now; flows are slow enough to be used when they come, so no past is kept."""
+        """The estimate now; no past is kept."""
         factor = _SIGNS / SCALE
         flags = {"on_ground": memory.on_ground, "believed": memory.state.used}
         cov = memory.state.P * np.outer(factor, factor)
@@ -97,10 +108,10 @@ class FlowFrontEnd:
 
     def process(self, sample: Sample, estimate: Callable[[], Estimate]) -> tuple[Measurement, ...]:
         out = []
-        for flow, t in zip(sample.data.flows, sample.data.times):
-            if abs(flow) >= self.slowest:
-                sigma = self.floor + self.share * abs(flow)
-                z, R = np.array([self.alpha, flow]), np.array([0.0, sigma * sigma])
+        for seen, t in zip(sample.data.flows, sample.data.times):
+            if abs(seen) >= self.slowest:
+                sigma = self.floor + self.share * abs(seen)
+                z, R = np.array([self.alpha, seen]), np.array([0.0, sigma * sigma])
                 out.append(Measurement("flow", t, sample.t_arrival, z, R))
         return tuple(out)
 
