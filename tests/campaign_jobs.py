@@ -6,8 +6,9 @@ import os
 import signal
 from pathlib import Path
 
+from landing_sim.campaign.dispersions import draw
 from landing_sim.campaign.file import Plan
-from landing_sim.campaign.landing import Landing, land
+from landing_sim.campaign.landing import FIGURES, Landing, land
 
 
 def dies_once(plan: Plan, run: int) -> Landing:
@@ -31,6 +32,12 @@ def kills(plan: Plan, run: int) -> Landing:
 def cheap(plan: Plan, run: int) -> Landing:
     """No flight."""
     return Landing(run, "landed", values={"wind.crosswind_mps": float(run)})
+
+
+def held(plan: Plan, run: int) -> Landing:
+    """No flight: banked beyond any limit where the sweep is at its third value."""
+    figures = dict.fromkeys(FIGURES, 1.0) | {"peak_roll_deg": 99.0 if run % 3 == 2 else 0.0}
+    return Landing(run, "landed", "", figures, draw(plan.campaign, run))
 
 
 def square(number: int) -> int:

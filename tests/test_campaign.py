@@ -227,6 +227,24 @@ def test_the_command_line(campaign: Path, flown: Path, tmp_path: Path) -> None:
     assert set(table.column("filter.kind").to_pylist()) <= {"augmented", "plain"}
 
 
+def test_the_sheet_of_a_sweep_is_that_of_its_aim(campaign: Path, tmp_path: Path) -> None:
+    from landing_sim.campaign.sheet import sheet
+
+    path = tmp_path / "c.yaml"
+    path.write_text(SHORT + "sweep: {path: camera.noise_dn, values: [0, 10, 20], aim: 10}\n")
+    for runs in (1, 30):
+        run.fly(file.load(path, runs), tmp_path / "o", 1, method="fork", job=campaign_jobs.held)
+        found = sheet(store.read(tmp_path / "o"), tmp_path / "o")
+        assert found["sweep"] == {"path": "camera.noise_dn", "unit": None, "aim": 10, "values": [0, 10, 20]}
+        (row,) = found["risks"]
+        if runs == 1:  # the aim has not been flown yet
+            assert (row["n"], row["verdict"], found["passed"]) == (0, "NOT ENOUGH EVIDENCE", False)
+    assert (row["count"], row["n"], row["verdict"], row["largest_pass"]) == (0, 10, "PASS", 10)
+    by_value = [(r["value"], r["count"], r["verdict"]) for r in row["by_value"]]
+    assert by_value == [(0, 0, "PASS"), (10, 0, "PASS"), (20, 10, "FAIL")]
+    assert found["passed"]
+
+
 def test_bad_campaigns_exit_2_and_write_nothing(tmp_path: Path) -> None:
     (tmp_path / "bad.yaml").write_text(SHORT.replace("crosswind", "croswind"))
     for arguments in (("campaign", "bad.yaml", "--json"), ("check", "bad.yaml")):

@@ -5,7 +5,9 @@
     landing.py       one landing: run index (or noise) to a row of figures
     pool.py cluster.py   where landings are flown: local processes, dask
     run.py store.py  fly what is missing; one row a landing in SQLite; `Results`
-    verdict.py tails.py rare.py sensitivity.py   statistics: pure functions of columns     report.py   one HTML page
+    worst.py         which variable is worst: each held at its ends in turn
+    verdict.py tails.py rare.py sensitivity.py   statistics: pure functions of columns
+    sheet.py report.py export.py   what is seen of it     commands.py   the command line
 
 What the statistics may rely on (`store.read(folder) -> Results`):
 

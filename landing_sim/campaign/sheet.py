@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from landing_sim.campaign import verdict
 from landing_sim.campaign.store import FILE, HISTORIES, Results
 from landing_sim.campaign.units import factor
@@ -37,17 +39,15 @@ def sheet(results: Results, folder: Path, rare: Mapping[str, verdict.Bounds] | N
         aim = sweep.values[-1] if sweep.aim is None else sweep.aim
         rows = []
         swept = verdict.sweep(campaign.risks, columns[sweep.path], columns, outcome, campaign.seed, rare, aim * scale)
-        for risk in swept:
+        nothing = np.empty(0), np.empty(0, dtype=str)
+        for risk, asked in zip(swept, campaign.risks):
             by_value = {
                 _given(held, sweep.values, scale): verdict.to_json(row) for held, row in zip(risk.values, risk.judged)
             }
             largest = None if risk.largest_passing is None else _given(risk.largest_passing, sweep.values, scale)
-            if aim in by_value:
-                rows.append(
-                    by_value[aim]
-                    | {"largest_pass": largest}
-                    | {"by_value": [{"value": value} | row for value, row in by_value.items()]}
-                )
+            at_aim = by_value.get(aim) or verdict.to_json(verdict.judge(asked, *nothing))
+            table = [{"value": value} | row for value, row in by_value.items()]
+            rows.append(at_aim | {"largest_pass": largest, "by_value": table})
         found["sweep"] = {"path": sweep.path, "unit": sweep.unit, "aim": aim, "values": sorted(sweep.values)}
     found["risks"] = rows
     found["passed"] = bool(rows) and all(row["verdict"] == verdict.PASS for row in rows)
