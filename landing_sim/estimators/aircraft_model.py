@@ -252,7 +252,7 @@ def propagate(x: Array, s: Array, u: Array, par: Array, on_ground: bool, dt: flo
     On the ground the gear carries the aircraft and no such model is at hand: velocities and rates are then held, and the
     process noise (larger there) accounts for what happens.
     """
-    A, k, y = np.zeros((12, 18)), np.zeros((4, 12)), x.copy()
+    A, rates, y = np.zeros((12, 18)), np.zeros((4, 12)), x.copy()
     V = math.sqrt((x[0] - x[12]) ** 2 + x[1] ** 2 + x[2] ** 2)  # along-wind only: enough for a thrust lapse
     s0 = s.copy()
     a_s, a_e = math.exp(-dt / par[_TAU_S]), math.exp(-dt / par[_TAU_E])
@@ -271,15 +271,15 @@ def propagate(x: Array, s: Array, u: Array, par: Array, on_ground: bool, dt: flo
     for stage in range(4):
         share = 1.0 if stage == 3 else 0.5
         for i in range(12 if stage > 0 else 0):
-            y[i] = x[i] + share * dt * k[stage - 1, i]
-        dynamics(y, mid, par, k[stage], A, stage == 0)
+            y[i] = x[i] + share * dt * rates[stage - 1, i]
+        dynamics(y, mid, par, rates[stage], A, stage == 0)
         for i in range(6 if on_ground else 0):
-            k[stage, i] = 0.0
+            rates[stage, i] = 0.0
     for i in range(6 if on_ground else 0):
         for j in range(18):
             A[i, j] = 0.0
     for i in range(12):
-        x[i] += dt / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
+        x[i] += dt / 6.0 * (rates[0, i] + 2.0 * rates[1, i] + 2.0 * rates[2, i] + rates[3, i])
 
     # exp(A dt), rows of wind and offsets being zero: I + A dt (I + A dt/2 (I + A dt/3))
     n = 18

@@ -47,7 +47,7 @@ def _polygon(lines: Array, width: float, height: float, out: np.ndarray) -> int:
     now[0, 0] = now[3, 0] = now[0, 1] = now[1, 1] = -GUARD
     now[1, 0] = now[2, 0] = width - 1.0 + GUARD
     now[2, 1] = now[3, 1] = height - 1.0 + GUARD
-    count = np.int64(4)
+    count: int = np.int64(4)  # type: ignore[assignment]  # numba compiles a constant for itself
     for i in range(lines.shape[0]):
         count = _halve(now, count, lines[i, 0], lines[i, 1], lines[i, 2], then)
         now, then = then, now

@@ -85,7 +85,8 @@ def pulled(begin: float, end: float, brighter: float, blur: float) -> float:
             best = k
     N = P[best + 2] - 2.0 * P[best] + P[best - 2]
     raw = 0.5 * N / (2.0 * (P[best + 1] - P[best - 1]) - P[best + 2] + P[best - 2])
-    return best - REACH + _edge_at(raw, blur, np.int64(1))[0]
+    arm: int = np.int64(1)  # type: ignore[assignment]  # numba compiles a constant for itself
+    return best - REACH + _edge_at(raw, blur, arm)[0]
 
 
 @kernel

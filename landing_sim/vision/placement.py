@@ -53,6 +53,8 @@ from landing_sim.vision.threshold import in_metres, place_threshold
 def _place_horizon(F: Array, I: np.ndarray, at: int, n: int, view: View, sigma: float, rule: Array) -> None:
     """n windows in rows at.. spread over the horizon, where no runway lies right below it."""
     sky, half = view.lines[HORIZON], int(rule[MASK]) // 2
+    feature: int = np.int64(HORIZON)  # type: ignore[assignment]  # numba compiles a constant for itself
+    arm: int = np.int64(3)  # type: ignore[assignment]
     su, sv, au, av, advance = path(sky, 0.0, 0.0)
     search = search_range(rule, sigma, advance)
     mu = (search + REACH) * abs(su) + half * abs(au) + 3.0
@@ -82,11 +84,11 @@ def _place_horizon(F: Array, I: np.ndarray, at: int, n: int, view: View, sigma: 
                 continue
             l = sky.copy()
             for _ in range(4):  # the horizon's line turns with the azimuth it is looked at
-                line = feature_line(np.int64(HORIZON), view.p_RC, view.R_CR, view.lens, view.width, view.slope, u, v)
+                line = feature_line(feature, view.p_RC, view.R_CR, view.lens, view.width, view.slope, u, v)
                 oriented(line, view.up, l)
                 u, v = on_line(l, u, v)
             su, sv, au, av, advance = path(l, 0.0, 0.0)
-            put(F, I, i, u, v, su, sv, au, av, advance, half, search, np.int64(3))
+            put(F, I, i, u, v, su, sv, au, av, advance, half, search, arm)
             break
 
 
