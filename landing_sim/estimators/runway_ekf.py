@@ -23,6 +23,7 @@ from landing_sim.estimators.runway_filter import RAD, Blocks, FilterConfig, Memo
 from landing_sim.estimators.runway_steps import correct_dense, correct_ud, of_index, transition, weigh
 from landing_sim.estimators.width import WidthFilter, rescaled
 from landing_sim.geometry.pinhole import Intrinsics
+from landing_sim.geometry.so3 import from_euler
 from landing_sim.signals import Command, Estimate, Measurement, Residuals
 from landing_sim.types import Array
 
@@ -194,6 +195,9 @@ class RunwayEkf:
             alpha = min(max(theta - c.approach_angle, -0.1), 0.2)
             x[states.U], x[states.W] = memory.airspeed * math.cos(alpha), memory.airspeed * math.sin(alpha)
             x[states.P : states.R + 1] = memory.gyro
+            if any(c.wind):  # the air moves, and the aircraft with it
+                x[states.WX : states.WX + 2] = c.wind
+                x[states.U : states.W + 1] += np.array([*c.wind, 0.0]) @ from_euler(*m.z[3:])
         x[pose] = m.z
         P = np.diag(var)
         P[np.ix_(pose, pose)] = m.R

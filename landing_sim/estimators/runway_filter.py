@@ -29,6 +29,7 @@ class FilterConfig:
     encoder_noise: float = 0.005 * RAD  # [rad] of each reading, common to all edges of an image
     gyro_bias_sigma: float = 0.1 * RAD
     width_sigma: float = 4.0  # [m] prior, where width is estimated
+    wind: tuple[float, float] = (0.0, 0.0)  # [m/s] prior along x and y of R
     wind_sigma: tuple[float, float, float] = (3.0, 3.0, 1.0)  # [m/s] prior
     q_velocity: tuple[float, float, float] = (0.05, 0.04, 0.05)  # [m/s^2]
     q_velocity_alone: float = 0.15  # where wind and offsets are no states and act as noise

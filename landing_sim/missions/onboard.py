@@ -111,6 +111,7 @@ def estimator(scenario: Scenario, vehicle: Vehicle, camera: BelievedCamera, nois
         encoder_sigma=math.radians(b.encoder_sigma_deg),
         encoder_noise=math.radians(scenario.camera.platform.encoder_noise_deg),
         gyro_bias_sigma=math.radians(scenario.sensors.gyro.bias_dps),
+        wind=truth.steady_wind(scenario, vehicle)[:2] if b.wind_reported else (0.0, 0.0),
         turbulence=_reported_turbulence(scenario),
         offset_sigma=offset_sigma(believed, vehicle.guidance.path.approach_mps, flap, b.aero_sigma, b.mass_sigma),
     )

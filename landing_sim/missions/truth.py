@@ -110,9 +110,14 @@ def heading(scenario: Scenario, vehicle: Vehicle) -> float:
     start = scenario.initial
     if start.heading_deg is not None:
         return math.radians(start.heading_deg)
-    airspeed = _airspeed(scenario, vehicle)
-    across = _steady(scenario.wind).velocity(0.0, start.x_m, start.y_m, start.height_m, airspeed)[1]
-    return -math.asin(min(max(across / airspeed, -1.0), 1.0))
+    across = steady_wind(scenario, vehicle)[1] / _airspeed(scenario, vehicle)
+    return -math.asin(min(max(across, -1.0), 1.0))
+
+
+def steady_wind(scenario: Scenario, vehicle: Vehicle) -> tuple[float, float, float]:
+    """[m/s] the air's mean velocity in R where the flight begins."""
+    s = scenario.initial
+    return _steady(scenario.wind).velocity(0.0, s.x_m, s.y_m, s.height_m, _airspeed(scenario, vehicle))
 
 
 def _airspeed(scenario: Scenario, vehicle: Vehicle) -> float:

@@ -77,6 +77,9 @@ class Believed(Section):
     turbulence_mps: NotNegative | None = Field(
         None, description="reported turbulence, as the wind at 20 ft that goes with it; null = as it is"
     )
+    wind_reported: bool = Field(
+        False, description="the steady wind where the flight begins is known on board; else its prior is still air"
+    )
     focal_scale: float = Field(1.0, ge=0.5, le=2, description="believed over true focal length")
     encoder_sigma_deg: float = Field(
         0.03, ge=0, le=5, description="what the data sheet says of the platform's constant angle error, 1 sigma"
