@@ -202,3 +202,10 @@ def test_a_found_gust_is_a_scenarios_gust(direction: str) -> None:
         now = wind.wind(0.005 * k, -899.0, 0.0, 40.0, 50.0)
     wanted = {"headwind": (-5, 0, 0), "tailwind": (5, 0, 0), "left": (0, -5, 0), "right": (0, 5, 0), "up": (0, 0, -5)}
     np.testing.assert_allclose(now, wanted.get(direction, (0, 0, 5)), atol=1e-12)
+
+
+@pytest.mark.parametrize("breaks_at", [0.3, 1.234, 5.5, 9.99])
+def test_the_size_is_found_to_the_tolerance(breaks_at: float) -> None:
+    found = falsify(lambda gust: gust.size - breaks_at, [0.0], [30.0], 10.0, directions=("up",), shapes=("ramp",))
+    assert found.gust is not None
+    assert 0.0 < found.gust.size - breaks_at <= 0.1
