@@ -242,6 +242,20 @@ def test_windows_are_cut_from_the_frame(
     assert np.array_equal(frame.window(*corner, 1, 1)[0, 0], full[corner[1], corner[0]])
 
 
+@settings(max_examples=60, deadline=None)
+@given(view=poses, seed=st.integers(0, 2**32 - 1), crowded=st.floats(0.05, 1.0))
+def test_what_windows_share_is_the_same_in_all_of_them(view: CameraTruth, seed: int, crowded: float) -> None:
+    """Two dozen that overlap, at the frame's corners too: joined into few blocks, or not, the pixels are the frame's."""
+    rng = np.random.default_rng(seed)
+    frame = render_frame(view, SMALL, Runway(), Optics(), key=6, index=2)
+    place = rng.random((24, 2)) * crowded + rng.choice([0.0, 1.0 - crowded])
+    corners = np.floor(place * (150 - 31 + 1, 100 - 23 + 1)).astype(np.int64)
+    low = rng.integers(0, (31, 23), (24, 2))
+    looked = np.hstack([low, rng.integers(low + 1, (32, 24))])
+    for (u, v), (u0, v0, u1, v1), window in zip(corners, looked, frame.windows(corners, 31, 23, looked), strict=True):
+        assert np.array_equal(window[v0:v1, u0:u1], frame.full()[v + v0 : v + v1, u + u0 : u + u1])
+
+
 def test_windows_are_cut_from_the_frame_of_the_main_case() -> None:
     for view in flight(25, seed=3):
         frame = render_frame(view, CAMERA, Runway(), Optics(), key=11, index=7)

@@ -15,8 +15,9 @@ import numpy as np
 
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.sensors import render_cv2
-from landing_sim.sensors.render_kernels import TILE, edge_table, project, shade
+from landing_sim.sensors.render_kernels import TILE, edge_table, project
 from landing_sim.sensors.render_noise import develop_frame, develop_materials, developed, gaussian_quantiles
+from landing_sim.sensors.render_windows import shade_windows
 from landing_sim.signals import CameraTruth
 from landing_sim.types import Array
 from landing_sim.world.runway import GRASS, SKY, Runway
@@ -195,7 +196,7 @@ class RenderedFrame:
         scene = self._project()
         if looked is None:
             looked = np.empty((0, 4), dtype=np.int64)
-        return shade(  # type: ignore[no-any-return]
+        return shade_windows(  # type: ignore[no-any-return]
             out, corners, width, height, looked, filled, *scene, r.camera, r.palette, r.lens, r.table, r.quantiles, r.key,
             self.index,
         )  # fmt: skip
