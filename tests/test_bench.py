@@ -16,7 +16,7 @@ sys.path.append(str(ROOT / "tools"))
 from bench_parts import bound, flights, where  # noqa: E402
 
 from landing_sim import scenario, vehicle  # noqa: E402
-from landing_sim.estimators import kalman  # noqa: E402
+from landing_sim.estimators import kalman, states  # noqa: E402
 
 PROMISED = {
     *("ratio_median", "ratio_min", "ratio_max", "recorded_ratio_median", "bare_step_us", "added_steps_per_frame"),
@@ -106,6 +106,40 @@ def test_bound_lies_near_the_filters_own_sigma() -> None:
     for name, i in (("x", 9), ("y", 10), ("H", 11)):
         assert sigma[i] == pytest.approx(log.sigma(name)[-1], rel=0.15)
     assert 0.8 < np.sqrt(np.mean(np.square(limit.edge_errors))) < 1.2
+
+
+def test_bound_begins_with_the_filters_own_prior() -> None:
+    s, v = short(0.3)
+    parts: list = []
+    steps: list = []
+    log = flights.land(s, v, prepare=parts.append, watch=steps.append).log
+    p = parts[0]
+    limit = bound.Bound(p.estimator, s.runway.width_m, p.plant.trimmed, p.clock.delay * p.clock.dt)
+    first = int(np.argmax(log["valid"]))
+    sigma = [limit.add(step) for step in steps[: first + 1]][-1]
+    believed = [log.sigma(name)[first] for name in states.NAMES[:12]]
+    np.testing.assert_allclose(sigma, believed, rtol=1e-12)
+
+
+def test_an_error_that_lasts_is_told_from_noise_of_its_size() -> None:
+    rng = np.random.default_rng(3)
+    groups = [k // 48 for k in range(48 * 400)]
+    noise = rng.normal(size=len(groups))
+    pulled = 0.25 + np.sqrt(1.0 - 0.25**2) * noise
+    assert np.sqrt(np.mean(pulled**2)) == pytest.approx(1.0, abs=0.02)
+    assert bound.lasting(list(noise), groups) == pytest.approx(1.0, abs=0.1)
+    assert bound.lasting(list(pulled), groups) == pytest.approx(2.0, abs=0.1)  # sqrt(1 - 0.0625 + 48 * 0.0625)
+
+
+def test_standard_error_is_that_of_independent_flights() -> None:
+    """RMS of n values of variance 1 has the standard deviation 1 / sqrt(2 n), n = 5 for each of 60 flights."""
+    rng = np.random.default_rng(4)
+    found = [bound.standard_error(list(rng.normal(size=(60, 5))), [np.ones(5)] * 60) for _ in range(40)]
+    assert np.mean(found) == pytest.approx(1.0 / np.sqrt(600.0), rel=0.1)
+    # a hundred cycles of one flight that all say the same are no more than one
+    same = [np.repeat(e, 100) for e in rng.normal(size=(60, 1))]
+    assert bound.standard_error(same, [np.ones(100)] * 60) == pytest.approx(1.0 / np.sqrt(120.0), rel=0.4)
+    assert np.isnan(bound.standard_error([np.ones(3)], [np.ones(3)]))
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["check", "do128/gust"]])
