@@ -11,6 +11,8 @@ Source     Dickmanns & Schell 1992, sections 2-4 and 7.1; Bierman 1977. Departs:
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +22,16 @@ from landing_sim.estimators.belief import AircraftBelief
 from landing_sim.estimators.gusts import change
 from landing_sim.estimators.inertial_model import airspeed_model, gyro_model
 from landing_sim.estimators.runway_filter import RAD, Blocks, FilterConfig, Memory
-from landing_sim.estimators.runway_steps import correct_dense, correct_ud, of_index, transition, weigh
+from landing_sim.estimators.runway_steps import (
+    airspeed_dense,
+    correct_dense,
+    correct_ud,
+    edges_dense,
+    gyro_dense,
+    of_index,
+    transition,
+    weigh,
+)
 from landing_sim.estimators.width import WidthFilter, rescaled
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.geometry.so3 import from_euler
@@ -119,15 +130,13 @@ class RunwayEkf:
             case "gyro":
                 if not memory.valid:
                     return memory._replace(gyro=measurement.z)
-                nu, Hx = gyro_model(memory.x, measurement.z)
-                x, P, D, _, _ = self._correct(memory, Hx, measurement.R, nu, _ALL)
+                x, P, D = self._reading(memory, gyro_dense, gyro_model, measurement.z, measurement.R)
                 return memory._replace(x=x, P=P, D=D, gyro=measurement.z)
             case "airspeed":
                 z = float(measurement.z[0])
                 if not memory.valid:
                     return memory._replace(airspeed=z)
-                nu, Hx = airspeed_model(memory.x, z)
-                x, P, D, _, _ = self._correct(memory, Hx, measurement.R, nu, _ALL)
+                x, P, D = self._reading(memory, airspeed_dense, airspeed_model, z, measurement.R)
                 return memory._replace(x=x, P=P, D=D, airspeed=z)
             case "on_ground":
                 down = bool(measurement.z[0] > 0.5)
@@ -245,27 +254,41 @@ class RunwayEkf:
             return x, P, None, step, nis
         return correct_ud(memory.x, memory.P, memory.D, index, starts, Hx, R, nu, use)  # type: ignore[no-any-return]
 
+    def _reading(
+        self, memory: Memory, dense: Callable[..., Any], model: Callable[..., Any], z: Array | float, R: Array
+    ) -> tuple[Array, Array, Array | None]:
+        """x, P, D after a reading z of variance R, which `model` explains; `dense` is its kernel where P is dense."""
+        if memory.D is None:
+            x, P = dense(memory.x, memory.P, self.blocks.index, self.blocks.starts, z, R, _ALL)
+            return x, P, None
+        nu, Hx = model(memory.x, z)
+        return self._correct(memory, Hx, R, nu, _ALL)[:3]
+
     def _edges(self, memory: Memory, m: Measurement) -> Memory:
         edges, c = m.geometry, self.config
         if edges is None:
             raise ValueError("a measurement of kind 'edges' needs its EdgeSet")
         starting = memory.frames < c.start_frames
-        gate, cov = math.inf if starting else self._gate, self._covariance(memory)
-
-        def weighed(x: Array) -> tuple[Array, Array, Array, np.ndarray, Array, np.ndarray, int, int, bool]:
-            return weigh(  # type: ignore[no-any-return]
-                x, cov, self.blocks.index, m.z, m.R, self._extra_R, gate, edges.feature, edges.status, edges.centre,
-                edges.direction, edges.pan, edges.tilt, self._lever, self._focal, self._slope,
-            )  # fmt: skip
-
-        nu, R, Hx, use, innovation, status, found, used, threshold = weighed(memory.x)
-        R_used = R * np.maximum(1.0, np.abs(nu) / (np.sqrt(R) * c.huber)) if starting else R
-        x, P, D, step, nis = self._correct(memory, Hx, R_used, nu, use)
-        for _ in range(c.start_iterations - 1 if starting else 0):
-            # Huber: an edge far off at the current iterate counts less
-            nu, R, Hx, *_ = weighed(x)
-            R_used = R * np.maximum(1.0, np.abs(nu) / (np.sqrt(R) * c.huber))
-            x, P, D, step, nis = self._correct(memory, Hx, R_used, nu + of_index(Hx, self.blocks.index) @ step, use)
+        index, gate = self.blocks.index, math.inf if starting else self._gate
+        told = (
+            m.z, m.R, self._extra_R, gate, edges.feature, edges.status, edges.centre, edges.direction, edges.pan,
+            edges.tilt, self._lever, self._focal, self._slope,
+        )  # fmt: skip
+        D = memory.D
+        if D is None and not starting:
+            x, P, innovation, status, nis, found, used, threshold = edges_dense(
+                memory.x, memory.P, index, self.blocks.starts, *told
+            )
+        else:
+            cov = self._covariance(memory)
+            nu, R, Hx, use, innovation, status, found, used, threshold = weigh(memory.x, cov, index, *told)
+            R_used = R * np.maximum(1.0, np.abs(nu) / (np.sqrt(R) * c.huber)) if starting else R
+            x, P, D, step, nis = self._correct(memory, Hx, R_used, nu, use)
+            for _ in range(c.start_iterations - 1 if starting else 0):
+                # Huber: an edge far off at the current iterate counts less
+                nu, R, Hx, *_ = weigh(x, cov, index, *told)
+                R_used = R * np.maximum(1.0, np.abs(nu) / (np.sqrt(R) * c.huber))
+                x, P, D, step, nis = self._correct(memory, Hx, R_used, nu + of_index(Hx, index) @ step, use)
         after = memory._replace(
             x=x,
             P=P,

@@ -11,6 +11,7 @@ import numpy as np
 
 from landing_sim.estimators.aircraft_model import propagate
 from landing_sim.estimators.edge_model import edge_model
+from landing_sim.estimators.inertial_model import airspeed_model, gyro_model
 from landing_sim.estimators.kalman import expand, innovation_variance, integrated_noise, update_dense, update_ud
 from landing_sim.estimators.states import DRIVING, JPAN, JTILT, N
 from landing_sim.geometry.runway_image import THRESHOLD
@@ -107,6 +108,43 @@ def correct_ud(
     """The same on U-D factors: x, U, D, dx and the NIS."""
     U, D, dx, nis = update_ud(U.copy(), D.copy(), of_index(Hx, index), R, nu, use, starts)
     return _moved(x, index, dx), U, D, dx, nis
+
+
+@kernel
+def edges_dense(
+    x: Array, P: Array, index: np.ndarray, starts: np.ndarray, z: Array, variance: Array, extra: float, gate: float,
+    feature: np.ndarray, status: np.ndarray, centre: Array, direction: Array, pan: float, tilt: float, lever: Array,
+    focal: Array, slope: float,
+) -> tuple[Array, Array, Array, np.ndarray, float, int, int, bool]:  # fmt: skip
+    """`weigh` and `correct_dense` in one: an array that Python never sees is one that it need not be handed.
+
+    Returns x, P; nu with NaN, status (n,), the NIS; how many were found and used, whether the threshold was.
+    """
+    nu, R, Hx, use, innovation, verdict, found, used, threshold = weigh(
+        x, P, index, z, variance, extra, gate, feature, status, centre, direction, pan, tilt, lever, focal, slope
+    )
+    x_after, P_after, _, nis = correct_dense(x, P, index, starts, Hx, R, nu, use)
+    return x_after, P_after, innovation, verdict, nis, found, used, threshold
+
+
+@kernel
+def gyro_dense(
+    x: Array, P: Array, index: np.ndarray, starts: np.ndarray, z: Array, R: Array, use: np.ndarray
+) -> tuple[Array, Array]:
+    """x, P after a reading z (3,) of the gyros."""
+    nu, Hx = gyro_model(x, z)
+    x_after, P_after, _, _ = correct_dense(x, P, index, starts, Hx, R, nu, use)
+    return x_after, P_after
+
+
+@kernel
+def airspeed_dense(
+    x: Array, P: Array, index: np.ndarray, starts: np.ndarray, z: float, R: Array, use: np.ndarray
+) -> tuple[Array, Array]:
+    """x, P after a reading z [m/s] of the airspeed."""
+    nu, Hx = airspeed_model(x, z)
+    x_after, P_after, _, _ = correct_dense(x, P, index, starts, Hx, R, nu, use)
+    return x_after, P_after
 
 
 @kernel
