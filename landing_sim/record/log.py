@@ -10,19 +10,17 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from array import array
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib import metadata
-from itertools import chain
 from typing import Any
 
 import numpy as np
 
 from landing_sim.signals import (
     CameraSample,
-    CameraTruth,
-    Command,
     EdgeSet,
     Estimate,
     Feature,
@@ -31,7 +29,6 @@ from landing_sim.signals import (
     Status,
     Step,
     Touchdown,
-    Truth,
 )
 from landing_sim.types import Array
 
@@ -71,11 +68,7 @@ _SENSED = (
 )
 _UPDATE = ("nis", "nis_dof")
 _FIXED = ("t_s", "est_t_s", *_TRUE, *_COMMAND, *_REFERENCE, *_SENSED, *_UPDATE)
-_AT = {name: i for i, name in enumerate(_FIXED)}
-_P, _V, _W, _E = _AT["true_x_m"], _AT["true_vx_mps"], _AT["true_p_radps"], _AT["true_phi_rad"]
-_A, _S, _G = _AT["true_wx_mps"], _AT["true_elevator_rad"], _AT["true_wheel_left_m"]
-_ON, _C, _U, _R = _AT["true_ground_left"], _AT["true_camera_x_m"], _AT["cmd_elevator_rad"], _AT["ref_airspeed_mps"]
-_M = _AT["meas_p_radps"]
+_V = _FIXED.index("true_vx_mps")
 _NO_GYRO = np.full(3, np.nan)
 
 
@@ -131,15 +124,11 @@ class FlightLog:
 
 @dataclass(slots=True)
 class LogBuilder:
-    """Keeps what steps hold, which are values, but no image; columns are made at the end, all rows at once."""
+    """Takes down what steps say, but no image: numbers while they are at hand, the rest, which are values, as it is."""
 
-    _truth: list[Truth] = field(default_factory=list)
-    _camera: list[CameraTruth] = field(default_factory=list)
+    _rows: array[float] = field(default_factory=lambda: array("d"))  # _FIXED, then R_RB, of one step after the other
     _estimate: list[Estimate] = field(default_factory=list)
     _reference: list[Reference] = field(default_factory=list)
-    _command: list[Command] = field(default_factory=list)
-    _gyro: list[Array] = field(default_factory=list)
-    _other: list[tuple[float, ...]] = field(default_factory=list)  # airspeed, pan, tilt, frame, nis, its dof
     _edges: list[tuple[int, EdgeSet, Array, Residuals | None]] = field(default_factory=list)
 
     def add(self, step: Step) -> None:
@@ -159,18 +148,23 @@ class LogBuilder:
         seen = step.residuals
         for measurement in step.measurements:
             if measurement.geometry is not None:
-                self._edges.append((len(self._truth), measurement.geometry, measurement.z, seen))
-        self._gyro.append(gyro)
-        self._other.append(
-            (airspeed, pan, tilt, frame, math.nan, 0.0)
-            if seen is None
-            else (airspeed, pan, tilt, frame, seen.nis, seen.dof)
-        )
-        self._truth.append(step.truth)
-        self._camera.append(step.camera)
+                self._edges.append((len(self._estimate), measurement.geometry, measurement.z, seen))
+        nis, dof = (math.nan, 0.0) if seen is None else (seen.nis, seen.dof)
+        now, camera, command, reference = step.truth, step.camera, step.command, step.reference
+        self._rows.extend((
+            now.t, step.estimate.t, *now.p_RB.tolist(), *now.v_RB_R.tolist(), *now.w_RB_B.tolist(), *now.euler.tolist(),
+            *now.wind_R.tolist(), now.airspeed, now.alpha, now.beta, *now.surfaces.tolist(), now.thrust,
+            *now.wheels_height.tolist(), *now.on_ground.tolist(), now.load_factor,
+            *camera.p_RC.tolist(), camera.pan, camera.tilt,
+            command.elevator, command.aileron, command.rudder, command.throttle, command.flap,
+            command.brake_left, command.brake_right, command.pan, command.tilt,
+            reference.airspeed, reference.height, reference.climb_rate, reference.y,
+            reference.psi, reference.phi, reference.theta_ff, reference.r_ff,
+            *gyro.tolist(), airspeed, pan, tilt, frame, nis, dof,
+            *now.R_RB.ravel().tolist(),
+        ))  # fmt: skip
         self._estimate.append(step.estimate)
         self._reference.append(step.reference)
-        self._command.append(step.command)
 
     def finish(
         self,
@@ -187,17 +181,17 @@ class LogBuilder:
         end : why the loop stopped, as the mission says ("stopped", "time", "numeric_error", ...)
         runway : true width_m, length_m: what the judge needs to say "off the runway"
         """
-        n = len(self._truth)
+        n = len(self._estimate)
         if n == 0:
             raise LogError("no step was logged: the flight ended before its first control cycle")
-        rows, names = self._fixed(), self._estimate[0].names
+        rows, names = np.array(self._rows).reshape(n, -1), self._estimate[0].names
         columns: dict[str, np.ndarray] = {name: rows[:, i].copy() for i, name in enumerate(_FIXED)}
         for name in ("true_ground_left", "true_ground_right", "true_ground_third"):
             columns[name] = columns[name] > 0.5
         for name in ("nis_dof", "meas_frame"):
             columns[name] = np.nan_to_num(columns[name], nan=-1.0).astype(np.int64)
         columns["true_H_m"] = -columns["true_z_m"]
-        R_RB = np.concatenate([truth.R_RB for truth in self._truth]).reshape(n, 3, 3)
+        R_RB = rows[:, len(_FIXED) :].copy().reshape(n, 3, 3)
         uvw = np.einsum("nji,nj->ni", R_RB, rows[:, _V : _V + 3])  # R_BR v_R
         for i, name in enumerate(("u", "v", "w")):
             columns[f"true_{name}_mps"] = uvw[:, i]
@@ -232,41 +226,6 @@ class LogBuilder:
         log = FlightLog(columns, meta)
         columns["nees"], columns["nees_dof"] = _nees(log, names, cov)
         return log
-
-    def _fixed(self) -> Array:
-        """(n, len(_FIXED))"""
-        truth, camera, command, reference = self._truth, self._camera, self._command, self._reference
-        rows = np.empty((len(truth), len(_FIXED)))
-
-        def vectors(at: int, values: Sequence[Array]) -> None:
-            """Columns from `at` on; one small array a cycle."""
-            rows[:, at : at + len(values[0])] = np.concatenate(values).reshape(len(values), -1)
-
-        def scalars(at: int, values: Iterable[tuple[float, ...]]) -> None:
-            block = np.fromiter(chain.from_iterable(values), float).reshape(len(rows), -1)
-            rows[:, at : at + block.shape[1]] = block
-
-        scalars(0, ((now.t, estimate.t) for now, estimate in zip(truth, self._estimate)))
-        vectors(_P, [now.p_RB for now in truth])
-        vectors(_V, [now.v_RB_R for now in truth])
-        vectors(_W, [now.w_RB_B for now in truth])
-        vectors(_E, [now.euler for now in truth])
-        vectors(_A, [now.wind_R for now in truth])
-        scalars(_A + 3, ((now.airspeed, now.alpha, now.beta) for now in truth))
-        vectors(_S, [now.surfaces for now in truth])
-        scalars(_S + 4, ((now.thrust,) for now in truth))
-        vectors(_G, [now.wheels_height for now in truth])
-        vectors(_ON, [now.on_ground for now in truth])
-        scalars(_ON + 3, ((now.load_factor,) for now in truth))
-        vectors(_C, [c.p_RC for c in camera])
-        scalars(_C + 3, ((c.pan, c.tilt) for c in camera))
-        scalars(_U, ((c.elevator, c.aileron, c.rudder, c.throttle, c.flap) for c in command))
-        scalars(_U + 5, ((c.brake_left, c.brake_right, c.pan, c.tilt) for c in command))
-        scalars(_R, ((r.airspeed, r.height, r.climb_rate, r.y) for r in reference))
-        scalars(_R + 4, ((r.psi, r.phi, r.theta_ff, r.r_ff) for r in reference))
-        vectors(_M, self._gyro)
-        scalars(_M + 3, self._other)
-        return rows
 
     def _covariances(self, m: int) -> Array:
         """(n, m, m), NaN where the estimate has none."""
