@@ -68,25 +68,26 @@ def shade_windows(
             out, corners, w, h, looked, filled, lines, seen, counts, horizon, camera, palette, lens, table, quantiles,
             key, index,
         )  # fmt: skip
-    tops, parts, across, down = np.empty((m, 2), np.int64), np.zeros((m, 4), np.int64), 0, 0
+    tops, parts = np.empty((m, 2), np.int64), np.zeros((m, 4), np.int64)
+    size = np.zeros(2, np.int64)  # an array, since `shade` would be compiled once more for the constant 0
     for k in range(m):
         tops[k, 0], tops[k, 1] = boxes[k, 0], boxes[k, 2]
         parts[k, 2], parts[k, 3] = boxes[k, 1] - boxes[k, 0], boxes[k, 3] - boxes[k, 2]
-        across, down = max(across, parts[k, 2]), max(down, parts[k, 3])
+        size[0], size[1] = max(size[0], parts[k, 2]), max(size[1], parts[k, 3])
     # blocks are all as large as the largest: near the frame's end a box lies further back in its own
     for k in range(m):
         for c in range(2):
-            parts[k, c] = max(0, tops[k, c] + (down if c else across) - int(camera[3 + c]))
+            parts[k, c] = max(0, tops[k, c] + size[c] - int(camera[3 + c]))
             tops[k, c] -= parts[k, c]
             parts[k, 2 + c] += parts[k, c]
-    made = np.empty((m * down, across), np.uint8)
+    made = np.empty((m * size[1], size[0]), np.uint8)
     shade(
-        made, tops, across, down, parts, filled, lines, seen, counts, horizon, camera, palette, lens, table, quantiles,
+        made, tops, size[0], size[1], parts, filled, lines, seen, counts, horizon, camera, palette, lens, table, quantiles,
         key, index,
     )  # fmt: skip
     for i in range(n):
         k = member[i]
-        left, top = corners[i, 0] - tops[k, 0], corners[i, 1] - tops[k, 1] + k * down
+        left, top = corners[i, 0] - tops[k, 0], corners[i, 1] - tops[k, 1] + k * size[1]
         for r in range(looked[i, 1], looked[i, 3]):
             for c in range(looked[i, 0], looked[i, 2]):
                 out[i * h + r, c] = made[top + r, left + c]
