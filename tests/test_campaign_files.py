@@ -154,7 +154,7 @@ WRONG = {
 def test_mistakes_are_named_with_their_place(case: str, tmp_path: Path) -> None:
     text, expected = WRONG[case]
     found = problems(tmp_path, text)
-    assert re.match(expected, found[0]), found
+    assert any(re.match(expected, problem) for problem in found), found
 
 
 def test_all_mistakes_of_a_kind_at_once(tmp_path: Path) -> None:
