@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from vision_bench import APPROACH, CAMERA, LEVER, RAD, Bench, fixate, pose_of, sight
+from vision_bench import APPROACH, CAMERA, LEVER, RAD, Bench, fixate, map_of, pose_of, scattered_poses, sight
 
 from landing_sim.geometry.runway_image import displacement, horizon_dip, image_line, plane_normal
 from landing_sim.signals import CameraSample, Estimate, Feature, Sample, Status
@@ -473,3 +473,22 @@ def test_threshold_windows_keep_off_side_strips_too_narrow_for_them(width: float
     clean = clean_strips(width, painted.outermost, painted.gap)
     assert len(clean) == strips
     assert clean[-1].tolist() == [-painted.gap, painted.gap]
+
+
+def test_paint_beside_a_border_does_not_pull_its_edge() -> None:
+    """Without noise; half a pixel from paint it was 0.025 px for one in twenty, and the same image after image."""
+    bench = Bench(noise=0.0, known=map_of(Runway()))
+    renderer, planner = bench.renderer(), WindowPlanner(bench.known, bench.camera)
+    errors, wanted = [], 0
+    for pose, pan, tilt in scattered_poses(150, 11):
+        s = sight(pose, pan, tilt)
+        w = planner.place(s, COV, COUNTS)
+        z, _, _, status = planner.measure(bench.sample(renderer, pose, pan, tilt).frame, w)
+        border = (w.feature == Feature.LEFT) | (w.feature == Feature.RIGHT)
+        seen = border & (status == FOUND)
+        h, _ = planner.predict(w.feature[seen], w.centre[seen], w.direction[seen], s)
+        errors += list(np.abs(z[seen] - h))
+        wanted += int(border.sum())
+    assert np.quantile(errors, 0.95) < 0.01
+    assert np.quantile(errors, 0.99) < 0.02
+    assert len(errors) > 0.95 * wanted

@@ -96,7 +96,8 @@ class Acquisition:
         # weak edges are welcome where there are many of them; wide first, then just wide enough for what is left
         edges = replace(edges or EdgeConfig(), min_snr=3.0)
         self._planners = [
-            WindowPlanner(runway, camera, SearchConfig(search_min=s, search_max=s), edges) for s in (12, 6, 4)
+            WindowPlanner(runway, camera, SearchConfig(search_min=s, search_max=s, clear_of_paint=0.0), edges)
+            for s in (12, 6, 4)
         ]
 
     def acquire(self, sample: CameraSample, pan: float, tilt: float) -> Acquired:

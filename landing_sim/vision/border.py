@@ -10,7 +10,9 @@ from landing_sim.geometry.runway_image import HORIZON, LEFT, THRESHOLD
 from landing_sim.jit import kernel
 from landing_sim.types import Array
 from landing_sim.vision.layout import (
+    BLUR,
     CENTRE,
+    CLEAR_OF_PAINT,
     FEATURE,
     MAPPED,
     MASK,
@@ -31,7 +33,6 @@ from landing_sim.vision.masks import REACH
 from landing_sim.vision.prediction import View, cut, dot, in_image
 
 _CLEARANCE = 2.0  # [px] between a mask and another edge
-_PROFILE = 4.5  # steps from the edge that the mask's profile reaches; two less with an arm of 1
 _PLACES = 17  # places tried around each regular one, 1/32 of the line apart
 _FAR = 45.0  # [px] breadth of the threshold below which no mask fits between the marks along a border
 _OPPOSITE = 1.5  # [px] between what a border's mask looks at and the other border
@@ -94,8 +95,9 @@ def place_border(
 
     Kept clear of the corners and of where the borderlines and the horizon converge; those at a mapped taxiway mouth are
     dropped. Of the places around each regular one the first is taken where no paint is within the search range; else
-    within the smallest one; else within the mask itself, the test for ambiguity standing guard; else little of it, which
-    is what a far runway shows; else with shorter masks.
+    within the smallest one; else within the mask itself, the test for ambiguity standing guard; else within a mask with
+    an arm of 1, if paint is to be kept clear of; else little of it, which is what a far runway shows; else with shorter
+    masks.
     """
     for i in range(at, at + n):
         I[i, FEATURE], I[i, STATUS] = side, OUT
@@ -138,9 +140,9 @@ def place_border(
     m = min(n, int(span / mask) + 1)
     for i in range(m):
         wish = 0.5 if m == 1 else i / (m - 1.0)
-        for k in range(6 * _PLACES):
+        for k in range(7 * _PLACES):
             level, place = k // _PLACES, k % _PLACES
-            if level == 3 and not far:
+            if (level == 3 and rule[CLEAR_OF_PAINT] == 0.0) or (level == 4 and not far):
                 continue
             t = wish + (place // 2 + place % 2) * (1.0 if place % 2 else -1.0) / 32.0
             if t < 0.0 or t > 1.0:
@@ -153,13 +155,16 @@ def place_border(
                     taken |= max(abs(F[j, CENTRE] - u), abs(F[j, CENTRE + 1] - v)) < mask
             if taken:
                 continue
-            h = half if level < 4 else min(half, 6 - level)
-            arm = 1 if level == 3 or unknown else 3
-            search = wanted if level in (0, 3) else min(wanted, rule[SEARCH_MIN])
-            near = _PROFILE - 3.0 + arm
-            reach = near + (search + 1.0 if level in (0, 1, 3) else 0.0)
+            h = half if level < 5 else min(half, 7 - level)
+            arm = 1 if level in (3, 4) or unknown else 3
+            search = wanted if level in (0, 4) else min(wanted, rule[SEARCH_MIN])
+            # the parabola looks one step beyond the mask's arm, and there at what is blurred into that pixel
+            near = arm + 1.5
+            if not (level == 4 or unknown):
+                near = max(near, arm + 1.0 + rule[CLEAR_OF_PAINT] * rule[BLUR] / advance)
+            reach = near + (search + 1.0 if level in (0, 1, 4) else 0.0)
             s0, s1, deep = _footprint(view, side, u, v, su, sv, au, av, h, reach)
-            if level == 3:
+            if level == 4:
                 if _covered(paint, side, s0, s1, deep) > _SHARE:
                     continue
                 s0, s1, deep = _footprint(view, side, u, v, su, sv, au, av, h, near)

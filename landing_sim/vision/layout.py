@@ -18,7 +18,8 @@ from landing_sim.vision.prediction import NEAR, View
 CENTRE, DIRECTION, STEP, ALONG, ORIGIN, NORMAL_STEP, OFFSET = 0, 2, 4, 6, 8, 10, 11
 # columns of I; CORNER takes two, LOOKED four: of the window's pixels, columns and rows lo, and hi, that are looked at
 FEATURE, STATUS, HALF, SEARCH, CORNER, ARM, LOOKED = 0, 1, 2, 3, 4, 6, 7
-MASK, SIGMAS, SEARCH_MIN, SEARCH_MAX, EXTRA_SIGMA, SEPARATION, BLUR = 0, 1, 2, 3, 4, 5, 6  # fields of the rule
+# fields of the rule
+MASK, SIGMAS, SEARCH_MIN, SEARCH_MAX, EXTRA_SIGMA, SEPARATION, BLUR, CLEAR_OF_PAINT = 0, 1, 2, 3, 4, 5, 6, 7
 # fields of the runway, [m] if UNIT is 0, in widths of it if 1 (unknown): length; |y| of the outermost and of the innermost
 # side of the stripes; where they begin, how long they are, and their mean contrast over the surface's; how far behind the
 # threshold no border is looked for; how far ahead of the aircraft one is, whatever the length

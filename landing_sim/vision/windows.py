@@ -54,7 +54,9 @@ class SearchConfig:
     """How windows are laid out.
 
     mask [px] length of the masks, odd; search ranges [px] are `sigmas` times the predicted uncertainty within bounds;
-    extra_sigma [px] uncertainty that the covariance does not know of; separation [px] from other edges of the scene.
+    extra_sigma [px] uncertainty that the covariance does not know of; separation [px] from other edges of the scene;
+    clear_of_paint: sigma of the blur between a border's mask and paint (2.5: an edge is pulled by 0.005 px; 0: half a
+    pixel, by up to 0.1 px).
     """
 
     mask: int = 9
@@ -62,6 +64,7 @@ class SearchConfig:
     search_min: int = 4
     search_max: int = 20
     extra_sigma: float = 0.5
+    clear_of_paint: float = 2.5
     separation: float = 8.0
 
     def __post_init__(self) -> None:
@@ -151,7 +154,8 @@ class WindowPlanner:
         self._runway: Array = runway.row()
         self._paint, self._mouths = runway.border_paint(), runway.mouth_rows()
         self._rule: Array = np.array(
-            [s.mask, s.sigmas, s.search_min, s.search_max, s.extra_sigma, s.separation, camera.blur], float
+            [s.mask, s.sigmas, s.search_min, s.search_max, s.extra_sigma, s.separation, camera.blur, s.clear_of_paint],
+            float,
         )
         sign = 1.0 if runway.brighter else -1.0
         self._polarity: Array = np.array([sign, sign, sign, 1.0])
