@@ -126,7 +126,8 @@ def design(settings: ControlSettings, models: Sequence[LinearModel]) -> Design:
 
 
 def _point(settings: ControlSettings, model: LinearModel) -> PointDesign:
-    lags = (settings.elevator.lag_s, settings.thrust.lag_s, settings.aileron.lag_s, settings.rudder.lag_s)
+    elevator, aileron, rudder = (a.lag_s + a.smoothing_s for a in (settings.elevator, settings.aileron, settings.rudder))
+    lags = (elevator, settings.thrust.lag_s, aileron, rudder)
     A, B = longitudinal_model(model)
     longitudinal = _axis(settings.longitudinal, A, B, LONGITUDINAL, INPUTS[:2], settings.loop_delay_s, lags[:2])
     A, B = lateral_model(model)

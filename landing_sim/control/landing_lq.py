@@ -58,7 +58,7 @@ class LandingController:
         approach = design.points[0].model
         self._thrust = ThrustMap(s.thrust)
         self._trim = (float(approach.inputs[0]), self._thrust.throttle(float(approach.inputs[1]), approach.airspeed))
-        self._limits = tuple((math.radians(a.max_deg), math.radians(a.rate_dps))
+        self._limits = tuple((math.radians(a.max_deg), math.radians(a.rate_dps), a.smoothing_s)
                              for a in (s.elevator, s.aileron, s.rudder))  # fmt: skip
         self._integral = (s.integral_limits["int_V"], s.integral_limits["int_H"])
         c = s.camera
@@ -213,7 +213,12 @@ def _clip(value: float, limit: float) -> float:
     return min(max(value, -limit), limit)
 
 
-def _limited(value: float, last: float, dt: float, limit: float, rate: float) -> float:
-    """Within ±limit and within rate dt of the last value."""
-    value = min(max(value, last - rate * dt), last + rate * dt) if dt > 0.0 else value
+def _limited(value: float, last: float, dt: float, limit: float, rate: float, smoothing: float) -> float:
+    """Smoothed with a time constant, within rate dt of the last value and within ±limit.
+
+    Noise that runs a servo at its rate limit takes the loop's phase: it is kept from it.
+    """
+    if dt > 0.0:
+        value = last + dt / (dt + smoothing) * (value - last)
+        value = min(max(value, last - rate * dt), last + rate * dt)
     return min(max(value, -limit), limit)

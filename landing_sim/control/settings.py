@@ -98,16 +98,19 @@ class ThrustSettings:
 
 @dataclass(frozen=True, slots=True)
 class LimitSettings:
-    """Believed limits of one control surface, about zero."""
+    """Believed limits of one control surface, about zero, and the time constant its commands are smoothed with."""
 
     max_deg: float
     rate_dps: float
     lag_s: float
+    smoothing_s: float = 0.0
 
     __pydantic_config__ = _STRICT
 
     def __post_init__(self) -> None:
         _positive(max_deg=self.max_deg, rate_dps=self.rate_dps)
+        if not self.smoothing_s >= 0.0:
+            raise ValueError("smoothing_s must be 0 or more")
 
 
 @dataclass(frozen=True, slots=True)
