@@ -15,7 +15,7 @@ from landing_sim import paths, vehicle
 from landing_sim.control.believed import believed, motion
 from landing_sim.control.design import Design, DesignError, LinearModel, design, design_dict, design_report
 from landing_sim.control.guidance import LandingGuidance
-from landing_sim.control.landing_lq import LandingController, ThrustMap
+from landing_sim.control.landing_lq import LandingController, ThrustMap, _limited
 from landing_sim.control.rollout import Rollout, RolloutMemory
 from landing_sim.control.settings import GustSettings, RolloutSettings
 from landing_sim.geometry.earth import RunwayFrame
@@ -453,3 +453,12 @@ def test_turbulence(intensity: str) -> None:
         assert abs(flight.y_touchdown) < 3.0
         assert flight.touchdown.sink_rate < 1.5
         assert 250.0 < flight.touchdown.x < 900.0
+
+
+def test_commands_are_smoothed_before_their_rate_is_limited() -> None:
+    """A step of 1: share 0.04 / (0.04 + 0.06) of it in the first cycle, of the rest in the second; then rate, then range."""
+    assert _limited(1.0, 0.0, 0.04, 9.0, 99.0, 0.06) == pytest.approx(0.4)
+    assert _limited(1.0, 0.4, 0.04, 9.0, 99.0, 0.06) == pytest.approx(0.64)
+    assert _limited(1.0, 0.0, 0.04, 9.0, 2.0, 0.06) == pytest.approx(0.08)
+    assert _limited(1.0, 0.0, 0.04, 0.3, 99.0, 0.0) == pytest.approx(0.3)
+    assert _limited(1.0, 0.0, 0.0, 9.0, 2.0, 0.06) == 1.0  # no cycle before it
