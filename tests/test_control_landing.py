@@ -456,7 +456,7 @@ def test_turbulence(intensity: str) -> None:
 
 
 def test_commands_are_smoothed_before_their_rate_is_limited() -> None:
-    """A step of 1: share 0.04 / (0.04 + 0.06) of it in the first cycle, of the rest in the second; then rate, then range."""
+    """A step of 1: 0.04 / (0.04 + 0.06) of it in the first cycle, of the rest in the second; then rate, then range."""
     assert _limited(1.0, 0.0, 0.04, 9.0, 99.0, 0.06) == pytest.approx(0.4)
     assert _limited(1.0, 0.4, 0.04, 9.0, 99.0, 0.06) == pytest.approx(0.64)
     assert _limited(1.0, 0.0, 0.04, 9.0, 2.0, 0.06) == pytest.approx(0.08)
