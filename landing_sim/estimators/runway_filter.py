@@ -31,12 +31,12 @@ class FilterConfig:
     width_sigma: float = 4.0  # [m] prior, where width is estimated
     wind: tuple[float, float] = (0.0, 0.0)  # [m/s] prior along x and y of R
     wind_sigma: tuple[float, float, float] = (3.0, 3.0, 1.0)  # [m/s] prior
-    q_velocity: tuple[float, float, float] = (0.05, 0.04, 0.05)  # [m/s^2]
+    q_velocity: tuple[float, float, float] = (0.03, 0.04, 0.05)  # [m/s^2]
     q_velocity_alone: float = 0.15  # where wind and offsets are no states and act as noise
     q_rates: tuple[float, float, float] = (1.5 * RAD, 1.0 * RAD, 1.0 * RAD)  # [rad/s^2]
     q_attitude: float = 0.02 * RAD
     q_position: float = 0.02
-    q_wind: tuple[float, float, float] = (0.4, 0.25, 0.2)  # in air that no turbulence is reported for
+    q_wind: tuple[float, float, float] = (0.35, 0.25, 0.2)  # in air that no turbulence is reported for
     turbulence: float = 0.0  # [m/s] wind at 20 ft that the reported turbulence goes with
     turbulence_velocity: float = 0.02  # [1/sqrt(s)] times that, added to q_velocity: gusts within a cycle
     offset_sigma: tuple[float, float, float] = (0.006, 0.045, 0.02)  # coefficients X, Z, m; see mismatch.py
