@@ -467,14 +467,14 @@ def test_the_filters_aircraft_trims_near_the_flown_one(clearance: float, lift: f
 # ---------------------------------------------------------------------------------------------- in the loop
 
 
-def lands_well(scenario: str, *changes: str, seed: int = 1, sink: float = 1.5) -> None:
-    flight = fly(scenario, *changes, seed=seed)
+def lands_well(scenario: str, *changes: str) -> None:
+    flight = fly(scenario, *changes)
     log, touch = flight.log, flight.log.touchdown
     assert flight.verdict.outcome == "landed"
     assert touch is not None
     assert touch.x == pytest.approx(400.0, abs=150.0)
     assert abs(touch.y) < 3.0
-    assert touch.sink_rate < sink
+    assert touch.sink_rate < 1.5
     assert abs(math.degrees(touch.bank)) < 3.0
     assert log["true_load_factor"].max() < 2.0
     assert np.abs(log["true_y_m"][log["t_s"] > touch.t]).max() < 15.0
