@@ -141,6 +141,14 @@ class InertialReading:
     moved_N: Array  # (3,) [m] way of the cg since the reading before: the exact integral of a velocity with this bias
 
 
+@dataclass(frozen=True, slots=True)
+class StrapdownReading:
+    """What a strapped-down inertial unit with its own attitude filter says, as on a multirotor's autopilot."""
+
+    a_B: Array  # (3,) [m/s^2] specific force, averaged since the reading before
+    euler: Array  # (3,) [rad] phi, theta, psi of the body against R, as the autopilot believes them
+
+
 # --------------------------------------------------------------------------------------------- onboard side
 
 
@@ -189,6 +197,8 @@ class Measurement:
                "pose": z (6,) x, y, H of the cg, phi, theta, psi of the body; R (6, 6): acquisition
                "gyro": z (3,) rad/s, R (3,); "airspeed": z (1,) m/s, R (1,); "on_ground": z (1,) 0 or 1
                "inertial": z (12,) euler, rates, v_N, moved_N of an InertialReading; "flow_angles": z (2,) alpha, beta
+               "strapdown": z (6,) a_B, euler of a StrapdownReading; "position": z (3,) x, y, z of the cg in R, R (3,)
+               "way_point": z (3,) x, y, z in R of the middle of the landing place
     """
 
     kind: str
