@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from landing_sim.signals import Estimate, InertialReading, Measurement, Sample
+from landing_sim.signals import Estimate, InertialReading, Measurement, Sample, StrapdownReading
 
 _MOST = 3  # numbers in a reading
 
@@ -34,3 +34,14 @@ class InertialFrontEnd:
         r: InertialReading = sample.data
         z = np.concatenate([r.euler, r.rates, r.v_N, r.moved_N])
         return (Measurement("inertial", sample.t_valid, sample.t_arrival, z, np.zeros(12)),)
+
+
+class StrapdownFrontEnd:
+    """A strapped-down inertial unit's readings as measurements "strapdown" (interfaces.FrontEnd)."""
+
+    sensor = "imu"
+
+    def process(self, sample: Sample, estimate: Callable[[], Estimate]) -> tuple[Measurement, ...]:
+        r: StrapdownReading = sample.data
+        z = np.concatenate([r.a_B, r.euler])
+        return (Measurement("strapdown", sample.t_valid, sample.t_arrival, z, np.zeros(6)),)

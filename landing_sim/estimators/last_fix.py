@@ -1,0 +1,92 @@
+"""No fusion: the last position fix, carried on with the velocity between fixes. What the fused filter is compared with.
+
+    p(t) = p_k + v (t - t_k),   v = (p_k - p_k-1) / (tau_k - tau_k-1)
+
+tau is when a fix's image was taken, t_k when the fix arrived: velocities are right, positions as old as the latency was.
+The extrapolation bridges the wait for the next fix, no more.
+
+Source     Brockers et al. 2012, section 5.1 ("PTAM-only").
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from landing_sim.estimators.strapdown_ekf import EPS, NAMES
+from landing_sim.signals import Command, Estimate, Measurement
+from landing_sim.types import Array
+
+_NOTHING = np.zeros(3)
+_NO_PLACE = np.full(3, np.nan)
+
+
+@dataclass(frozen=True, slots=True)
+class LastFixConfig:
+    """smoothing : [s] time constant of a low pass on the velocity; 0 = the last difference as it is
+    longest : [s] that a fix is carried on; then it stands
+    lost_after : [s] without a fix, and the vehicle is not localised
+    """
+
+    smoothing: float = 0.0
+    longest: float = 0.4
+    lost_after: float = 1.0
+
+
+class Memory(NamedTuple):
+    """The last fix, and what the autopilot said last."""
+
+    t: float
+    p: Array = _NOTHING  # (3,) in R
+    v: Array = _NOTHING
+    taken: float = -math.inf  # [s] when its image was taken
+    arrived: float = -math.inf
+    euler: Array = _NOTHING
+    place: Array = _NO_PLACE
+
+
+class LastFix:
+    """interfaces.Estimator. Takes the measurements that `StrapdownEkf` takes, of "strapdown" only the attitude."""
+
+    def __init__(self, config: LastFixConfig | None = None) -> None:
+        self.config = config or LastFixConfig()
+
+    def init(self, t: float) -> Memory:
+        return Memory(t)
+
+    def predict(self, memory: Memory, command: Command, t: float) -> Memory:
+        return memory._replace(t=t) if t > memory.t + EPS else memory
+
+    def update(self, memory: Memory, measurement: Measurement) -> Memory:
+        """A fix from before the last one is of no use any more."""
+        kind, z = measurement.kind, measurement.z
+        if kind == "strapdown":
+            return memory._replace(euler=z[3:])
+        if kind == "way_point":
+            return memory._replace(place=z)
+        if kind != "position":
+            raise ValueError(f"an estimator of fixes knows no measurement {kind!r}")
+        dt = measurement.t_valid - memory.taken
+        if dt <= EPS:
+            return memory
+        v = _NOTHING
+        if math.isfinite(dt):
+            share = 1.0 if self.config.smoothing == 0.0 else -math.expm1(-dt / self.config.smoothing)
+            v = memory.v + share * ((z - memory.p) / dt - memory.v)
+        return memory._replace(p=z, v=v, taken=measurement.t_valid, arrived=measurement.t_arrival)
+
+    def read(self, memory: Memory, t: float | None = None) -> Estimate:
+        """The estimate at the memory's time; an age `t` asked for is ignored. No covariance, no bias (NaN)."""
+        wait = min(max(0.0, memory.t - memory.arrived), self.config.longest)
+        valid = math.isfinite(memory.taken)
+        p = memory.p + memory.v * wait
+        mean = np.concatenate([p, memory.v, _NO_PLACE, memory.euler, memory.place])
+        mean[2], mean[14] = -mean[2], -mean[14]
+        flags = {
+            "localised": valid and memory.t - memory.taken <= self.config.lost_after,
+            "platform": bool(memory.place[0] == memory.place[0]),
+        }
+        return Estimate(memory.t, NAMES, mean, None, valid, flags)
