@@ -7,8 +7,8 @@ import signal
 from pathlib import Path
 
 from landing_sim.campaign.dispersions import draw
-from landing_sim.campaign.file import Plan
 from landing_sim.campaign.landing import FIGURES, Landing, land
+from landing_sim.campaign.plan import Plan
 
 
 def dies_once(plan: Plan, run: int) -> Landing:

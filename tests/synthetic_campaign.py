@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from landing_sim.campaign.dispersions import draw
-from landing_sim.campaign.file import METRICS, NEES_BANDS, Plan
 from landing_sim.campaign.landing import FIGURES, Landing
+from landing_sim.campaign.plan import METRICS, NEES_BANDS, Plan
 from landing_sim.campaign.store import Store
 
 

@@ -19,6 +19,7 @@ import pytest
 
 from landing_sim.campaign import file, pool, run, store
 from landing_sim.campaign.landing import Landing, land
+from landing_sim.campaign.plan import Campaign, Risk
 
 PROGRAM = Path(sys.executable).with_name("landing-sim")
 SHORT = """schema_version: 1
@@ -379,8 +380,8 @@ def test_time_histories_as_asked() -> None:
     from landing_sim.campaign.landing import kept
 
     figures = {"sink_rate_mps": 2.0}
-    plan = file.Campaign(
-        schema_version=1, scenario="x", risks=(file.Risk(name="a", metric="sink_rate_mps", above=1.5, probability=0.1),)
+    plan = Campaign(
+        schema_version=1, scenario="x", risks=(Risk(name="a", metric="sink_rate_mps", above=1.5, probability=0.1),)
     )
     assert kept(plan, "landed", figures)
     assert not kept(plan, "landed", {"sink_rate_mps": 1.4})

@@ -17,13 +17,14 @@ from landing_sim.campaign import file
 from landing_sim.campaign.dispersions import draw, normals
 from landing_sim.campaign.distributions import Distribution, quantile
 from landing_sim.campaign.landing import FIGURES, scenario_of
+from landing_sim.campaign.plan import Campaign, Plan
 from landing_sim.campaign.units import FACTORS, factor
 from landing_sim.noise import Noise
 
 HEAD = "schema_version: 1\nscenario: do128/gust\n"
 
 
-def load(tmp_path: Path, text: str, runs: int | None = None) -> file.Plan:
+def load(tmp_path: Path, text: str, runs: int | None = None) -> Plan:
     path = tmp_path / "c.yaml"
     path.write_text(HEAD + text)
     return file.load(path, runs)
@@ -387,5 +388,5 @@ def test_identity_is_that_of_the_landings(tmp_path: Path) -> None:
 def test_a_plan_survives_its_store(tmp_path: Path) -> None:
     plan = load(tmp_path, TWO, runs=3)
     assert plan.campaign.runs == 3
-    again = file.Campaign.model_validate_json(json.dumps(plan.campaign.model_dump(mode="json")))
+    again = Campaign.model_validate_json(json.dumps(plan.campaign.model_dump(mode="json")))
     assert again == plan.campaign

@@ -11,7 +11,8 @@ import pytest
 from synthetic_campaign import fill
 
 from landing_sim.campaign import rare_landings, store, verdict
-from landing_sim.campaign.file import CampaignError, Plan, load
+from landing_sim.campaign.file import load
+from landing_sim.campaign.plan import CampaignError, Plan
 from landing_sim.campaign.report import _interval, _power, html, report
 from landing_sim.campaign.report_figures import label
 from landing_sim.campaign.report_sections import severity

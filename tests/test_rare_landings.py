@@ -11,7 +11,8 @@ import pytest
 
 from landing_sim.campaign import landing, rare_landings
 from landing_sim.campaign.falsify import Gust
-from landing_sim.campaign.file import Plan, load
+from landing_sim.campaign.file import load
+from landing_sim.campaign.plan import Plan
 from landing_sim.campaign.pool import Done
 from landing_sim.campaign.rare import simulate
 from landing_sim.campaign.rare_landings import FRESH, Job, Landings, badness, fly, gust_margin, save, saved

@@ -1,6 +1,7 @@
 """Campaigns: one scenario flown many times with dispersed values, and what that proves.
 
-    file.py          the campaign's YAML into `Campaign`, every mistake with its place before anything flies
+    plan.py          what a campaign is: `Campaign`, `Plan`
+    file.py          its YAML into a `Plan`, every mistake with its place before anything flies
     dispersions.py   distributions, and the values of run k
     landing.py       one landing: run index (or noise) to a row of figures
     pool.py cluster.py   where landings are flown: local processes, dask
@@ -14,14 +15,14 @@ What the statistics may rely on (`store.read(folder) -> Results`):
     columns   name -> (n,) float64, a row a landing in order of "run"; NaN where the flight has no such figure
               every metric of `record.judge.measure` ("touchdown_x_m", "touchdown_y_m", "sink_rate_mps",
               "touchdown_bank_deg", ...), "touchdown_sideslip_deg", "gear_height_60m_m" (lower main wheel over the surface,
-              60 m past the threshold), "nees_BAND" for the bands of `file.NEES_BANDS`, "wall_s", "cpu_s",
+              60 m past the threshold), "nees_BAND" for the bands of `plan.NEES_BANDS`, "wall_s", "cpu_s",
               every dispersed value under its path ("wind.crosswind_mps"; words as their index in the choice), every
               variable under its name
     outcome   (n,) str: landed, go_around, crash, off_runway, timeout, numeric_error as `run`; cannot_fly where the aircraft
               has no trim for what was drawn; worker_killed where the landing took its process down twice; error where our
               own code raised (both are flown again when the command is run again)
     dispersed names of the columns that were drawn (not derived from others): what sensitivity explains scatter by
-    campaign  file.Campaign: name, runs, seed, risks, sweep, ...
+    campaign  plan.Campaign: name, runs, seed, risks, sweep, ...
     meta      JSON values: software, machine, workers, seconds it took
 
     Risk(name, metric, above, below, probability)   the event is metric > above or metric < below; either may be None.

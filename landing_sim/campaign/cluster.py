@@ -11,8 +11,8 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from landing_sim.campaign.file import CampaignError
 from landing_sim.campaign.machine import software
+from landing_sim.campaign.plan import CampaignError
 from landing_sim.campaign.pool import Done, Job, Value
 from landing_sim.errors import Mark, Problem
 

@@ -12,7 +12,7 @@ import typer
 from landing_sim.errors import ConfigError, Mark, Problem
 
 if TYPE_CHECKING:
-    from landing_sim.campaign.file import Plan
+    from landing_sim.campaign.plan import Plan
     from landing_sim.campaign.store import Results
     from landing_sim.record.log import FlightLog
 

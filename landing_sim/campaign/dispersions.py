@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from landing_sim.campaign.file import Campaign, assemble
+from landing_sim.campaign.plan import Campaign, assemble
 from landing_sim.noise import Noise, NoiseStream
 from landing_sim.types import Array
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from landing_sim import config, runner, scenario, vehicle, yamlfile
 from landing_sim.campaign.dispersions import draw
-from landing_sim.campaign.file import METRICS, NEES_BANDS, Campaign, Plan
+from landing_sim.campaign.plan import METRICS, NEES_BANDS, Campaign, Plan
 from landing_sim.errors import ConfigError, Mark
 from landing_sim.noise import NoiseStream
 from landing_sim.record import parquet

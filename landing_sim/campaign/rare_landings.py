@@ -19,7 +19,7 @@ import numpy as np
 
 from landing_sim.campaign import landing
 from landing_sim.campaign.falsify import Gust
-from landing_sim.campaign.file import Plan
+from landing_sim.campaign.plan import Plan
 from landing_sim.campaign.rare import ChainNoise, Estimate
 from landing_sim.campaign.run import evaluate
 from landing_sim.campaign.verdict import ALWAYS_EVENTS, Bounds, Risk

@@ -12,7 +12,7 @@ import numpy as np
 
 from landing_sim.campaign import rare_landings, report_figures, store, verdict
 from landing_sim.campaign import report_sections as part
-from landing_sim.campaign.file import Campaign, Plan
+from landing_sim.campaign.plan import Campaign, Plan
 from landing_sim.campaign.report_template import TEMPLATE
 from landing_sim.campaign.store import Results
 from landing_sim.campaign.units import factor

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from landing_sim.campaign import report_figures, verdict
-from landing_sim.campaign.file import NEES_BANDS, Campaign, Plan
+from landing_sim.campaign.plan import NEES_BANDS, Campaign, Plan
 from landing_sim.campaign.report_figures import label
 from landing_sim.campaign.sensitivity import strongest
 from landing_sim.campaign.store import Results

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from landing_sim.campaign import pool
-from landing_sim.campaign.file import Plan
 from landing_sim.campaign.landing import FIGURES, Landing, land
 from landing_sim.campaign.machine import caches_warm
+from landing_sim.campaign.plan import Plan
 from landing_sim.campaign.store import AGAIN, Store
 
 PRELOAD = ("landing_sim.campaign.landing",)

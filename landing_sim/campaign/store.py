@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from landing_sim.campaign.file import Campaign, CampaignError, Plan
 from landing_sim.campaign.machine import software, this_machine
+from landing_sim.campaign.plan import Campaign, CampaignError, Plan
 from landing_sim.errors import Mark, Problem
 from landing_sim.types import Array
 

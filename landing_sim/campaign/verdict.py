@@ -33,7 +33,7 @@ ALWAYS_EVENTS = ("numeric_error", "worker_killed", "error")
 
 
 class Risk(Protocol):
-    """What must be rare; `campaign.file.Risk` is one."""
+    """What must be rare; `campaign.plan.Risk` is one."""
 
     @property
     def name(self) -> str: ...

@@ -11,7 +11,7 @@ import numpy as np
 
 from landing_sim.campaign import run, store
 from landing_sim.campaign.distributions import Choice, quantile
-from landing_sim.campaign.file import Campaign, Plan, Sweep
+from landing_sim.campaign.plan import Campaign, Plan, Sweep
 from landing_sim.campaign.units import factor
 from landing_sim.campaign.verdict import Risk, events
 
