@@ -410,6 +410,26 @@ def test_without_dask_it_says_what_to_install(campaign: Path, tmp_path: Path, mo
         run.fly(file.load(campaign), tmp_path / "o", cluster="tcp://x")
 
 
+def test_a_dask_worker_never_compiles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without kernels on disk another process flies its first landing before it does; from then on nobody else."""
+    from landing_sim.campaign import cluster
+
+    marks: list[bool] = []
+
+    def warm(mark: bool = False) -> bool:
+        marks.append(mark)
+        return False
+
+    monkeypatch.setattr(cluster, "caches_warm", warm)
+    monkeypatch.setattr(cluster, "_looked", False)
+    monkeypatch.setenv("CAMPAIGN_TEST", str(tmp_path / "signed"))
+    assert [cluster._call(campaign_jobs.signs, k) for k in (4, 5)] == [(4, ""), (5, "")]
+    other, *ours = map(int, (tmp_path / "signed").read_text().split())
+    assert other != os.getpid()
+    assert ours == [os.getpid()] * 2
+    assert marks == [False, True]
+
+
 @pytest.mark.slow
 @needs_dask
 def test_dask_workers_fly_the_same_bits_and_one_killed_loses_nothing(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import os
 import platform
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -66,3 +68,15 @@ def caches_warm(mark: bool = False) -> bool:
         except OSError:  # not ours to write: kernels go to the user's own cache, and the first landing alone every time
             return False
     return stamp.is_file()
+
+
+@contextlib.contextmanager
+def compiling() -> Iterator[None]:
+    """One process of this machine at a time, where the package's folder and the system let us say so."""
+    with contextlib.ExitStack() as held:
+        with contextlib.suppress(ImportError, OSError):
+            import fcntl
+
+            stream = held.enter_context((_PACKAGE / "__pycache__" / "compiling.lock").open("w"))
+            fcntl.flock(stream, fcntl.LOCK_EX)
+        yield
