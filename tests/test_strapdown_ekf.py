@@ -304,7 +304,7 @@ def test_last_fix_stands_when_it_is_too_old_and_forgets_what_was_overtaken() -> 
     estimator = LastFix(LastFixConfig(longest=0.2, lost_after=0.5))
     fixes = fix(0.0, [0.0, 0.0, -1.0]), fix(0.1, [0.1, 0.0, -1.0]), fix(0.05, [9.0, 0.0, -1.0], late=0.1)
     estimate = estimator.read(run(estimator, 0.7, *fixes))
-    assert estimate["x"] == pytest.approx(0.1 + 0.2) and not estimate.flags["localised"]
+    assert estimate["x"] == pytest.approx(0.1 + 0.2) and estimate["vx"] == 0.0 and not estimate.flags["localised"]
     assert estimator.read(run(estimator, 0.55, *fixes)).flags["localised"]
 
 

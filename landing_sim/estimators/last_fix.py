@@ -27,7 +27,7 @@ _NO_PLACE = np.full(3, np.nan)
 @dataclass(frozen=True, slots=True)
 class LastFixConfig:
     """smoothing : [s] time constant of a low pass on the velocity; 0 = the last difference as it is
-    longest : [s] that a fix is carried on; then it stands
+    longest : [s] that a fix is carried on; then it stands still
     lost_after : [s] without a fix, and the vehicle is not localised
     """
 
@@ -80,10 +80,10 @@ class LastFix:
 
     def read(self, memory: Memory, t: float | None = None) -> Estimate:
         """The estimate at the memory's time; an age `t` asked for is ignored. No covariance, no bias (NaN)."""
-        wait = min(max(0.0, memory.t - memory.arrived), self.config.longest)
-        valid = math.isfinite(memory.taken)
-        p = memory.p + memory.v * wait
-        mean = np.concatenate([p, memory.v, _NO_PLACE, memory.euler, memory.place])
+        wait, valid = max(0.0, memory.t - memory.arrived), math.isfinite(memory.taken)
+        p = memory.p + memory.v * min(wait, self.config.longest)
+        v = memory.v if wait <= self.config.longest else _NOTHING
+        mean = np.concatenate([p, v, _NO_PLACE, memory.euler, memory.place])
         mean[2], mean[14] = -mean[2], -mean[14]
         flags = {
             "localised": valid and memory.t - memory.taken <= self.config.lost_after,
