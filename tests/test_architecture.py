@@ -32,7 +32,7 @@ ALLOWED_OURS = {
     **{part: ANYONE | ONBOARD | {"interfaces"} for part in ONBOARD},
 }
 ONLY_IN = {
-    "jsbsim": {"plants/jsbsim.py", "plants/jsbsim_lander.py"},
+    "jsbsim": {"plants/jsbsim.py", "plants/jsbsim_lander.py", "plants/jsbsim_quadrotor.py"},
     "rerun": {"record/replay.py", "record/stage.py", "record/lunar_replay.py"},
 }
 
