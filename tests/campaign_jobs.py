@@ -40,6 +40,15 @@ def held(plan: Plan, run: int) -> Landing:
     return Landing(run, "landed", "", figures, draw(plan.campaign, run))
 
 
+def windy(plan: Plan, run: int) -> Landing:
+    """No flight: crashes in more than 9.85 m/s of headwind, touches down harder in more than 4.9 m/s across."""
+    values = draw(plan.campaign, run)
+    if values["wind.headwind_mps"] > 9.85:
+        return Landing(run, "crash", values=values)
+    sink = (1.8 if values["wind.crosswind_mps"] > 4.9 else 0.8) + 0.1 * (run // 2)
+    return Landing(run, "landed", "", dict.fromkeys(FIGURES, 1.0) | {"sink_rate_mps": sink}, values)
+
+
 def square(number: int) -> int:
     """Killed by 7."""
     if number == 7:

@@ -5,12 +5,14 @@ usage: tools/rare CAMPAIGN [--risk NAME]... [--landings N] [--share P] [--worker
        tools/rare CAMPAIGN --risk NAME --falsify     the mildest gust that breaks the limit in run 0
 
 The first form adds what it finds to DIR/rare.json (DIR: the campaign's folder, out/NAME): `landing-sim campaign` and
-`report` take it up in their verdicts. Exit status 1 where the two intervals of --agree do not meet.
+`report` take it up in their verdicts. Exit status 1 where the two intervals of --agree do not meet, 2 for what cannot be
+asked, 3 where a simulation cannot go on.
 """
 
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 import time
 from pathlib import Path
@@ -19,9 +21,11 @@ import numpy as np
 
 from landing_sim.campaign import file
 from landing_sim.campaign.falsify import falsify
-from landing_sim.campaign.rare import Estimate, Level, simulate
+from landing_sim.campaign.plan import Plan, Risk
+from landing_sim.campaign.rare import Estimate, Level, RareError, simulate
 from landing_sim.campaign.rare_landings import Landings, Links, aimed, gust_margin, save
 from landing_sim.campaign.verdict import count_bounds
+from landing_sim.errors import ConfigError
 
 
 def told(level: Level) -> None:
@@ -43,6 +47,21 @@ def agree(space: Landings, estimate: Estimate[Links], n: int) -> bool:
     return bounds.lower <= estimate.upper and estimate.lower <= bounds.upper
 
 
+def mildest(plan: Plan, risk: Risk, run: int, largest: float, folder: Path) -> None:
+    """The falsifier's answer, and how to watch it."""
+    start = float(plan.scenario["initial"]["x_m"])
+    places = np.linspace(0.5 * start, 200.0, 5).tolist()
+    found = falsify(gust_margin(plan, risk, run), places, [30.0, 100.0, 250.0], largest)
+    if found.gust is None:
+        print(
+            f"  no gust up to {largest:g} m/s breaks it: {-found.margin:.3g} short, {found.flights} flights", flush=True
+        )
+        return
+    print(f"  {found.gust.words()} breaks it, by {found.margin:.2g}; {found.flights} flights")
+    (change,) = found.gust.changes()
+    print(f"  landing-sim replay {shlex.quote(str(folder))} --run {run} --set {shlex.quote(change)}", flush=True)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("campaign")
@@ -56,7 +75,11 @@ def main() -> int:
     parser.add_argument("--largest", type=float, default=15.0, help="m/s, of the gusts tried")
     parser.add_argument("--out", type=Path)
     args = parser.parse_args()
-    plan = file.load(args.campaign)
+    try:
+        plan = file.load(args.campaign)
+    except ConfigError as error:
+        print(error, file=sys.stderr)
+        return 2
     risks = [risk for risk in plan.campaign.risks if not args.risk or risk.name in args.risk]
     if len(risks) < len(args.risk or [1]):
         parser.error(f"its risks are: {', '.join(risk.name for risk in plan.campaign.risks)}")
@@ -65,23 +88,26 @@ def main() -> int:
     if held is not None and (sweep is None or held not in sweep.values):
         parser.error(f"--held {held:g} is none of the sweep's values")
     run = 0 if sweep is None or held is None else sweep.values.index(held)
+    folder = args.out or Path("out") / plan.campaign.name
     good = True
     for risk in risks:
         print(f"{plan.campaign.name}: {risk.name}", flush=True)
         if args.falsify:
-            start = float(plan.scenario["initial"]["x_m"])
-            places = np.linspace(0.5 * start, 200.0, 5).tolist()
-            found = falsify(gust_margin(plan, risk, run), places, [30.0, 100.0, 250.0], args.largest)
-            print(f"  {found.gust or 'nothing breaks it'}, {found.flights} flights", flush=True)
+            mildest(plan, risk, run, args.largest, folder)
             continue
         began = time.monotonic()
         space = Landings(plan, risk, args.workers, run)
-        estimate = simulate(space, args.landings, args.share, told=told)
+        try:
+            estimate = simulate(space, args.landings, args.share, told=told)
+        except ValueError as error:
+            parser.error(str(error))
+        except RareError as error:
+            print(f"  {error}", file=sys.stderr)
+            return 3
         show(estimate)
         if args.agree:
             good &= agree(space, estimate, args.agree)
         else:
-            folder = args.out or Path("out") / plan.campaign.name
             print(f"  {save(folder, plan, risk, estimate, held=held, seconds=time.monotonic() - began)}", flush=True)
     return 0 if good else 1
 

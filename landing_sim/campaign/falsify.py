@@ -36,6 +36,11 @@ class Gust:
     gradient: float
     size: float
 
+    def words(self) -> str:
+        """For people: "up ramp of 7.05 m/s over 45 m, met at x = -95 m"."""
+        where = f"over {self.gradient:.0f} m, met at x = {self.at_x:.0f} m"
+        return f"{self.direction} {self.shape} of {self.size:.2f} m/s {where}"
+
     def changes(self) -> tuple[str, ...]:
         """As --set takes it."""
         key, sign = _KEYS[self.direction]

@@ -27,9 +27,12 @@ class Held:
     risk: str
     count: int
     n: int
-    sigmas: (
-        float  # from the mean of the metric to its limit, in standard deviations: less is worse; NaN without flights
-    )
+    sigmas: float  # from the metric's mean to its limit, in standard deviations: less is worse; NaN without two figures
+
+    @property
+    def share(self) -> float:
+        """Of landings that were the event."""
+        return self.count / self.n if self.n else 0.0
 
 
 def ends(campaign: Campaign, name: str) -> tuple[float, ...]:
@@ -65,9 +68,12 @@ def worst(
     runs: int,
     names: Iterable[str] | None = None,
     workers: int | None = None,
-    told: Callable[[Held], None] | None = None,
+    told: Callable[[str, tuple[float, ...]], None] | None = None,
 ) -> list[Held]:
-    """Fly it: every drawn variable but words, or those in `names`; resumes in `folder`. Worst first, risk by risk."""
+    """Fly it: every drawn variable but words, or those in `names`; resumes in `folder`. Worst first, risk by risk.
+
+    told : hears which variable is held next, and where
+    """
     found = []
     for name in plan.campaign.drawn() if names is None else names:
         try:
@@ -76,6 +82,8 @@ def worst(
             if names is not None:
                 raise
             continue
+        if told is not None:
+            told(name, values)
         held = holding(plan, name, values, runs)
         run.fly(held, folder / name, workers)
         results = store.read(folder / name)
@@ -83,10 +91,8 @@ def worst(
             use = results.columns[name] == value
             for risk in plan.campaign.risks:
                 found.append(_held(name, value, risk, results.columns[risk.metric][use], results.outcome[use]))
-                if told is not None:
-                    told(found[-1])
     order = [risk.name for risk in plan.campaign.risks]
-    return sorted(found, key=lambda h: (order.index(h.risk), math.isnan(h.sigmas), h.sigmas))
+    return sorted(found, key=lambda h: (order.index(h.risk), -h.share, math.isnan(h.sigmas), h.sigmas))
 
 
 def _held(name: str, value: float, risk: Risk, metric: np.ndarray, outcome: np.ndarray) -> Held:
