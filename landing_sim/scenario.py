@@ -19,7 +19,8 @@ from pydantic import Field, model_validator
 from landing_sim import config, paths, yamlfile
 from landing_sim.config import Section, inconsistent
 from landing_sim.errors import ConfigError, Location, Problem, ScenarioError, did_you_mean
-from landing_sim.sections import wind
+from landing_sim.sections import faults, wind
+from landing_sim.sections.faults import Fault
 from landing_sim.sections.judged import LANDING, Criterion, Record
 from landing_sim.sections.lunar import LunarScenario
 from landing_sim.sections.onboard import Believed, Control, Filter, Guidance, Observer, Vision
@@ -56,6 +57,7 @@ class Scenario(Section):
     guidance: Guidance = Field(Guidance(), description="path")
     control: Control = Field(Control(), description="controller")
     record: Record = Field(Record(), description="outputs")
+    faults: tuple[Fault, ...] = Field((), max_length=20, description="what fails, how and when")
     criteria: tuple[Criterion, ...] = Field(
         LANDING, max_length=100, description="what makes it pass; a safe landing if left out"
     )
@@ -73,6 +75,7 @@ class Scenario(Section):
             if not _whole(period, unit):
                 problems.append((where, f"{period:g} is not a whole multiple of {name} = {unit:g}"))
         problems += wind.problems(self.wind)
+        problems += _failing(self)
         length = self.runway.length_m
         for i, taxiway in enumerate(self.runway.taxiways):
             half = 0.5 * taxiway.width_m + taxiway.flare_m
@@ -91,6 +94,22 @@ class Scenario(Section):
                 problems.append((("criteria", i, "low"), f"is above high = {limit.high:g}"))
         inconsistent(problems)
         return self
+
+
+def _failing(s: Scenario) -> list[tuple[Location, str]]:
+    """What does not fit together in faults and optic-flow sensors."""
+    flow, observer = s.sensors.optic_flow, s.filter.kind == "observer"
+    eyes = [f"flow_{i + 1}" for i in range(len(flow.angles_deg))]
+    names = ["inertial", "gyro", "airspeed", "squat", "camera", *eyes, *["flow_angles"] * observer]
+    found = faults.problems(s.faults, names, [*eyes, *["inertial"] * observer], ["camera"])
+    if eyes and observer:
+        found.append((("sensors", "optic_flow", "angles_deg"), "filter.kind observer has no use for them"))
+    if eyes and not _whole(s.time.cycle_s, 1.0 / flow.rate_hz):
+        message = f"a cycle of {s.time.cycle_s:g} s is not a whole number of samples"
+        found.append((("sensors", "optic_flow", "rate_hz"), message))
+    if flow.slowest_dps >= flow.fastest_dps:
+        found.append((("sensors", "optic_flow", "slowest_dps"), "is not below fastest_dps"))
+    return found
 
 
 def _whole(period: float, unit: float) -> bool:

@@ -124,7 +124,7 @@ WRONG = {
     "complex key": ("? [1, 2]\n: 3\n", r"s.yaml:3:3: \(file\): a key must be a plain word"),
     "section is a number": ("camera: 3\n", r"s.yaml:3:9: camera: must be a mapping of keys to values, not 3"),
     "null section": ("camera:\n", r"s.yaml:3:1: camera: must be a mapping of keys to values, not null"),
-    "faults are not built": ("faults:\n  - {sensor: gyro}\n", r"s.yaml:3:1: faults: unknown key"),
+    "fault of no kind": ("faults:\n  - {sensor: gyro}\n", r"s.yaml:4:5: faults.0.kind: missing: this key is required"),
     "literal": ("camera: {renderer: line_a}\n", r"s.yaml:3:20: camera.renderer: must be .* \(did you mean 'line_aa'\?\)"),
     "metric": ("criteria: [{metric: rang_m, high: 1}]\n", r"s.yaml:3:21: criteria.0.metric: .*did you mean 'range_m'"),
     "limits missing": ("criteria: [{metric: range_m}]\n", r"s.yaml:3:12: criteria.0: needs low, high or both"),

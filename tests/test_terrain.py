@@ -12,7 +12,7 @@ from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.noise import Noise
 from landing_sim.sensors.optic_flow_eye import FWHM, Eye
 from landing_sim.sensors.optic_flow_picture import TerrainFrame, picture
-from landing_sim.world.terrain import LEVELS, SITE, Layer, Terrain, TerrainConfig, _pyramid
+from landing_sim.world.terrain import LEVELS, SITE, Layer, Terrain, TerrainConfig, pyramid
 from landing_sim.world.terrain_relief import DARK, Scale, lit, relief
 
 CONFIG = TerrainConfig()
@@ -111,7 +111,7 @@ def test_acceptance_of_a_receptor() -> None:
     made.config = CONFIG
     zero = np.zeros((256, 256), np.float32)
     made.layers = tuple(
-        Layer(cell, zero, _pyramid(light)) for cell, light in ((0.4, step), (0.04, plain), (0.004, plain))
+        Layer(cell, zero, pyramid(light)) for cell, light in ((0.4, step), (0.04, plain), (0.004, plain))
     )
     assert all(len(layer.light) == LEVELS for layer in made.layers)
     acceptance, H = math.radians(0.1), 1000.0

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from landing_sim.interfaces import FrontEnd
 from landing_sim.signals import Estimate, InertialReading, Measurement, Sample, StrapdownReading
 
 _MOST = 3  # numbers in a reading
@@ -45,3 +46,16 @@ class StrapdownFrontEnd:
         r: StrapdownReading = sample.data
         z = np.concatenate([r.a_B, r.euler])
         return (Measurement("strapdown", sample.t_valid, sample.t_arrival, z, np.zeros(6)),)
+
+
+class Fresh:
+    """A front end (interfaces.FrontEnd) that leaves samples older than `oldest` [s] alone: nothing can take them in."""
+
+    def __init__(self, front_end: FrontEnd, oldest: float) -> None:
+        self.sensor = front_end.sensor
+        self.front_end, self.oldest = front_end, oldest
+
+    def process(self, sample: Sample, estimate: Callable[[], Estimate]) -> tuple[Measurement, ...]:
+        if sample.t_arrival - sample.t_valid > self.oldest:
+            return ()
+        return self.front_end.process(sample, estimate)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from landing_sim.control.design import Design, LinearModel, design
+from landing_sim.control.go_around import DoubtfulGuidance, Limits
 from landing_sim.control.guidance import LandingGuidance
 from landing_sim.control.offset import OffsetGuidance
 from landing_sim.control.settings import ControlSettings
@@ -17,7 +18,9 @@ from landing_sim.estimators.observer.gibert import Gibert, GibertConfig
 from landing_sim.estimators.observer.kinematic_ekf import EkfConfig, KinematicEkf
 from landing_sim.estimators.observer.looking import Ranging
 from landing_sim.estimators.observer.runway_observer import ObserverConfig, RunwayObserver
-from landing_sim.estimators.readings import InertialFrontEnd, Reading
+from landing_sim.estimators.optic_flow.aircraft import FieldFlowFrontEnd
+from landing_sim.estimators.optic_flow.aircraft_backup import BackupEkf
+from landing_sim.estimators.readings import Fresh, InertialFrontEnd, Reading
 from landing_sim.estimators.rewind import Rewind
 from landing_sim.estimators.runway_ekf import RunwayEkf
 from landing_sim.estimators.runway_filter import FilterConfig
@@ -34,6 +37,9 @@ from landing_sim.vision.windows import EdgeConfig
 from landing_sim.world.markings import stripe_count
 
 STANDARD, LAPSE = 288.15, 0.0065  # [K] at sea level, [K/m]: the standard atmosphere
+GYROS_SILENT = 3.5  # cycles without a reading until the gyros count as dead
+ALONE = 1.5  # times the rates' process noise while they are: moments of gusts are then seen in images only
+RECEPTORS = 6
 NOMINAL_WIDTH = 45.0  # [m] what an unknown runway is drawn with until its own motion tells
 
 
@@ -63,14 +69,50 @@ def front_ends(scenario: Scenario, camera: BelievedCamera) -> dict[str, FrontEnd
     known = RunwayMap.unknown(NOMINAL_WIDTH, brighter) if unknown else _map(scenario, brighter)
     config = FrontEndConfig(v.windows, v.platform_angle, edges=EdgeConfig(floor=v.edge_floor_px))
     front_end = RunwayFrontEnd(known, camera, config)
-    return {
+    found: dict[str, FrontEnd] = {
         "camera": front_end,
         "gyro": Reading("gyro", "gyro", math.radians(max(s.gyro.noise_dps, 0.01))),
         "airspeed": Reading("airspeed", "airspeed", _airspeed_sigma(scenario)),
         "squat": Reading("squat", "on_ground", 0.0),
         "inertial": InertialFrontEnd(),
         "flow_angles": Reading("flow_angles", "flow_angles", math.radians(s.flow_angles.noise_deg)),
+        **_eyes(scenario),
     }
+    reach = _horizon(scenario)
+    if scenario.faults and reach > 0.0:  # a sensor that fails may send what is older than can be put where it belongs
+        return {name: Fresh(one, reach) for name, one in found.items()}
+    return found
+
+
+def _eyes(scenario: Scenario) -> dict[str, FrontEnd]:
+    """Front ends of the visual motion sensors, where they are believed to look."""
+    s = scenario.sensors.optic_flow
+    return {
+        f"flow_{i + 1}": FieldFlowFrontEnd(
+            f"flow_{i + 1}",
+            math.radians(angle),
+            math.radians(s.floor_dps),
+            s.share,
+            math.radians(s.slowest_dps),
+            math.radians(s.fastest_dps),
+            s.lowest_m,
+            _passage(scenario),
+        )
+        for i, angle in enumerate(s.angles_deg)
+    }
+
+
+def _passage(scenario: Scenario) -> float:
+    """[s] the age of the slowest flow that is believed when its edge has crossed the row; of none without such sensors."""
+    s = scenario.sensors.optic_flow
+    return 0.5 * (RECEPTORS - 1) * s.spacing_deg / s.slowest_dps if s.angles_deg else 0.0
+
+
+def _horizon(scenario: Scenario) -> float:
+    """[s] how far back a measurement may reach: images are late, and flows are as old as half an edge's passage."""
+    latency = scenario.camera.latency_s if scenario.filter.compensate_latency else 0.0
+    oldest = max(latency, _passage(scenario))
+    return oldest + 2.0 * scenario.time.cycle_s if oldest > 0.0 else 0.0
 
 
 def _map(scenario: Scenario, brighter: bool) -> RunwayMap:
@@ -115,15 +157,19 @@ def estimator(scenario: Scenario, vehicle: Vehicle, camera: BelievedCamera, nois
         turbulence=_reported_turbulence(scenario),
         offset_sigma=offset_sigma(believed, vehicle.guidance.path.approach_mps, flap, b.aero_sigma, b.mass_sigma),
     )
-    ekf = RunwayEkf(
-        config,
+    told = (
         believed.perturbed(noise, b.aero_sigma, b.mass_sigma),
         camera.intrinsics,
         np.array(camera.p_BC),
         _believed_width(scenario),
         math.atan(scenario.runway.slope_percent / 100.0),
     )
-    return _late(scenario, ekf)
+    ekf = RunwayEkf(config, *told)
+    if not (scenario.faults or scenario.sensors.optic_flow.angles_deg):
+        return _late(scenario, ekf)  # nothing can fail: what would watch for it changes no bit of a flight
+    p, q, r = config.q_rates
+    alone = RunwayEkf(replace(config, q_rates=(ALONE * p, ALONE * q, ALONE * r)), *told)
+    return _late(scenario, BackupEkf(ekf, alone, GYROS_SILENT * scenario.time.cycle_s))
 
 
 def range_observer(scenario: Scenario, camera: BelievedCamera) -> RunwayObserver:
@@ -147,11 +193,9 @@ def _attitude_noise(scenario: Scenario) -> float:
 
 
 def _late(scenario: Scenario, estimator: Estimator) -> Estimator:
-    """Images that are old when they arrive are applied when they were taken."""
-    latency = scenario.camera.latency_s
-    if latency > 0.0 and scenario.filter.compensate_latency:
-        return Rewind(estimator, latency + 2.0 * scenario.time.cycle_s)
-    return estimator
+    """Images and flows that are old when they arrive are applied when they were taken."""
+    horizon = _horizon(scenario)
+    return Rewind(estimator, horizon) if horizon > 0.0 else estimator
 
 
 def _reported_turbulence(scenario: Scenario) -> float:
@@ -201,8 +245,18 @@ def control_settings(scenario: Scenario, vehicle: Vehicle) -> ControlSettings:
 
 def guidance(scenario: Scenario, vehicle: Vehicle) -> Guidance:
     """Glide, flare and rollout, on a line that may lie beside the centreline."""
-    g = LandingGuidance(vehicle.guidance, math.atan(scenario.runway.slope_percent / 100.0))
-    offset = scenario.guidance.lateral_offset_m
+    g: Guidance
+    g = landing = LandingGuidance(vehicle.guidance, math.atan(scenario.runway.slope_percent / 100.0))
+    doubt, offset = scenario.guidance.doubt, scenario.guidance.lateral_offset_m
+    if doubt is not None:
+        limits = Limits(
+            lateral=doubt.lateral_m,
+            height=doubt.height_m,
+            angle=math.radians(doubt.pitch_deg),
+            blind=doubt.blind_s,
+            patience=doubt.patience_s,
+        )
+        g = DoubtfulGuidance(landing, limits)
     return g if offset == 0.0 else OffsetGuidance(g, offset)
 
 

@@ -11,6 +11,7 @@ from landing_sim import paths
 from landing_sim.geometry.earth import RunwayFrame
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.interfaces import Sensor
+from landing_sim.missions.failing import with_faults
 from landing_sim.noise import NoiseStream
 from landing_sim.plants.aircraft import InitialState, JsbsimPlant
 from landing_sim.scenario import Scenario
@@ -19,11 +20,14 @@ from landing_sim.sensors.airdata import Airspeed, AirspeedConfig, FlowAngles, Fl
 from landing_sim.sensors.camera import Camera, Encoders
 from landing_sim.sensors.inertial import Gyro, GyroConfig
 from landing_sim.sensors.inertial_reference import InertialReference, InertialReferenceConfig
+from landing_sim.sensors.optic_flow import MotionSensor, MotionSensorConfig
+from landing_sim.sensors.optic_flow_edges import EdgeConfig
 from landing_sim.sensors.platform import PanTilt, Strapdown
 from landing_sim.sensors.render import Optics
 from landing_sim.sensors.squat import SquatSwitch
 from landing_sim.vehicle import Vehicle
 from landing_sim.world.dryden import FOOT, W20, Turbulence, low_altitude
+from landing_sim.world.field import Field, FieldConfig
 from landing_sim.world.first_order import FirstOrder
 from landing_sim.world.gusts import DiscreteGust
 from landing_sim.world.microburst import Microburst
@@ -176,7 +180,12 @@ def plant(scenario: Scenario, vehicle: Vehicle, platform: PanTilt | Strapdown, w
 def sensors(
     scenario: Scenario, platform: PanTilt | Strapdown, noise: Callable[[str], NoiseStream]
 ) -> tuple[Sensor, ...]:
-    """Inertial first: what the camera's front end is told rests on them."""
+    """Inertial first: what the camera's front end is told rests on them. Those that the scenario has fail do.
+
+    A fault of "inertial" is one of the whole unit: of the rate gyros on an aircraft that flies on the runway filter, of
+    those and the reference's attitude and velocity on one that flies on the range observer. The camera platform has gyros
+    of its own (see PanTilt) and goes on.
+    """
     cycle, c, p, s = scenario.time.cycle_s, scenario.camera, scenario.camera.platform, scenario.sensors
     bias = math.radians(p.encoder_bias_deg)
     camera = Camera(
@@ -208,10 +217,41 @@ def sensors(
     flow = FlowAnglesConfig(cycle, math.radians(vanes.noise_deg), math.radians(vanes.bias_deg))
     air = () if scenario.filter.kind != "observer" else (reference, FlowAngles(flow, noise("flow_angles")))
     gyro = GyroConfig(cycle, math.radians(s.gyro.noise_dps), math.radians(s.gyro.bias_dps))
-    return (
+    healthy = (
         Gyro(gyro, noise("gyro")),
         Airspeed(AirspeedConfig(cycle, s.airspeed.noise_mps), noise("airspeed")),
         *air,
         SquatSwitch(cycle),
+        *_eyes(scenario, noise),
         camera,
+    )
+    unit_names = tuple(sensor.name for sensor in healthy if sensor.name in ("gyro", "inertial"))
+    return with_faults(healthy, scenario.faults, noise, {"inertial": unit_names})
+
+
+def _eyes(scenario: Scenario, noise: Callable[[str], NoiseStream]) -> tuple[MotionSensor, ...]:
+    """The visual motion sensors, where they really look."""
+    s = scenario.sensors.optic_flow
+    if not s.angles_deg:
+        return ()
+    field = Field(FieldConfig(s.contrast), noise("field"))
+    edges = EdgeConfig(spacing=math.radians(s.spacing_deg), slowest=math.radians(s.slowest_dps))
+    names = {f"flow_{i + 1}": angle for i, angle in enumerate(s.angles_deg)}
+    return tuple(
+        MotionSensor(
+            name,
+            MotionSensorConfig(
+                scenario.time.cycle_s,
+                math.radians(angle + s.mounting_error_deg),
+                acceptance=math.radians(s.acceptance_deg),
+                rate=s.rate_hz,
+                noise=s.noise_dn,
+                level=scenario.runway.grey.grass,
+                blind=0.8 * s.lowest_m,
+                edges=edges,
+            ),
+            field,
+            noise(name),
+        )
+        for name, angle in names.items()
     )

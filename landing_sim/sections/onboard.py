@@ -98,10 +98,26 @@ class Control(Section):
     )
 
 
+class Doubt(Section):
+    """How much of it an approach is flown on with: beyond it for longer than patience_s it is given up.
+
+    Limits are of the estimate's own 1 sigma. Below the vehicle's decision height any approach is continued.
+    """
+
+    lateral_m: Positive = Field(1.0, description="at the threshold; further out a hundredth of the range is added")
+    height_m: Positive = Field(0.7, description="on the ground; higher up two hundredths of the height are added")
+    pitch_deg: Positive = Field(1.0, description="of pitch and of roll")
+    blind_s: Positive = Field(2.0, description="without any edge")
+    patience_s: NotNegative = Field(0.5, description="doubt for no longer is waited out")
+
+
 class Guidance(Section):
     """The path that is flown, where it is not the vehicle's own."""
 
     glide_deg: float | None = Field(None, ge=1, le=8, description="angle of the glide path; null = the vehicle's")
     lateral_offset_m: float = Field(
         0.0, ge=-20, le=20, description="guidance takes a line this far right (+) of the centreline for it"
+    )
+    doubt: Doubt | None = Field(
+        None, description="go around when the estimate is this uncertain; null = never for that"
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -73,6 +73,25 @@ class FlowAngles(Section):
     bias_deg: float = Field(0.1, ge=0, le=10, description="1 sigma of the constant bias of a vane, drawn per run")
 
 
+class OpticFlow(Section):
+    """Visual motion sensors, six photoreceptors in a row each, strapped down, looking ahead at the field."""
+
+    angles_deg: tuple[Annotated[float, Field(ge=2, le=90)], ...] = Field(
+        (), max_length=8, description="where they look, below the body's forward axis; none = no such sensors"
+    )
+    spacing_deg: float = Field(0.1, ge=0.02, le=2, description="between two receptors")
+    acceptance_deg: float = Field(0.1, ge=0.02, le=2, description="of one, at half height")
+    rate_hz: Positive = Field(250.0, description="of sampling")
+    noise_dn: NotNegative = Field(0.25, description="1 sigma of a sample's grey level")
+    contrast: float = Field(0.1, gt=0, le=0.3, description="of the field: rms a decade of wavelengths")
+    mounting_error_deg: float = Field(0.0, ge=-5, le=5, description="all look this much further down than believed")
+    slowest_dps: Positive = Field(0.5, description="slower flow is invalid")
+    fastest_dps: Positive = Field(10.0, description="faster flow is invalid")
+    lowest_m: NotNegative = Field(30.0, description="believed height of the cg below which flow is invalid")
+    floor_dps: Positive = Field(0.1, description="a flow's sigma, as believed, is this")
+    share: NotNegative = Field(0.02, description="and this share of it")
+
+
 class Sensors(Section):
     """Sensors other than the camera."""
 
@@ -80,3 +99,4 @@ class Sensors(Section):
     airspeed: Airspeed = Field(Airspeed(), description="airspeed")
     inertial: InertialUnit = Field(InertialUnit(), description="inertial reference unit, used by filter.kind observer")
     flow_angles: FlowAngles = Field(FlowAngles(), description="vanes, used by filter.kind observer")
+    optic_flow: OpticFlow = Field(OpticFlow(), description="visual motion sensors, not used by filter.kind observer")

@@ -1,4 +1,4 @@
-"""Visual motion sensors: six photoreceptors each, strapped down, looking at the terrain."""
+"""Visual motion sensors: six photoreceptors each, strapped down, looking at the terrain of the Moon or at a field."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from landing_sim.noise import NoiseStream
 from landing_sim.sensors.instrument import check_settings
 from landing_sim.sensors.optic_flow_edges import EdgeConfig, EdgeTracker
 from landing_sim.sensors.optic_flow_eye import Eye
+from landing_sim.sensors.optic_flow_field import FieldEye
 from landing_sim.signals import CameraTruth, Sample, Truth
 from landing_sim.types import Array
+from landing_sim.world.field import Field
 from landing_sim.world.terrain import Terrain
 
 LEVEL = 80.0  # [DN] of bare level ground
@@ -42,16 +44,20 @@ class MotionSensorConfig:
     acceptance: float = math.radians(0.1)  # full width at half height
     rate: float = 500.0
     noise: float = 0.25
+    level: float = LEVEL  # [DN] of brightness 1
+    blind: float = 0.0  # [m] over a field: lower than this it is dark
     edges: EdgeConfig = field(default_factory=EdgeConfig)
 
 
 class MotionSensor:
-    """interfaces.Sensor named `name`; between two readings the lander is taken to move evenly.
+    """interfaces.Sensor named `name`; between two readings the vehicle is taken to move evenly.
 
     Raises ValueError where a period is not a whole number of samples.
     """
 
-    def __init__(self, name: str, config: MotionSensorConfig, terrain: Terrain, noise: NoiseStream) -> None:
+    channels = 0  # a record, not numbers that a fault could scale or shift
+
+    def __init__(self, name: str, config: MotionSensorConfig, terrain: Terrain | Field, noise: NoiseStream) -> None:
         check_settings(name, config.period, 0.0, noise=config.noise)
         self._count = round(config.period * config.rate)
         if abs(self._count - config.period * config.rate) > 1e-9 or self._count < 1:
@@ -61,7 +67,11 @@ class MotionSensor:
         self.name, self.period, self._config, self._terrain, self._noise = name, config.period, config, terrain, noise
         rows = np.arange(config.receptors) - 0.5 * (config.receptors - 1)
         angles = np.asarray(config.alpha + rows * config.edges.spacing, dtype=float)
-        self._eye = Eye(terrain, angles, config.acceptance)
+        self._eye: Eye | FieldEye = (
+            FieldEye(terrain, angles, config.acceptance, config.blind)
+            if isinstance(terrain, Field)
+            else Eye(terrain, angles, config.acceptance)
+        )
         self._tracker = EdgeTracker(config.edges, config.receptors, 1.0 / config.rate)
         self._before: tuple[Array, Array, float] | None = None
 
@@ -73,7 +83,7 @@ class MotionSensor:
             self._start = truth.t
             return None
         light = self._eye.between(before[0], before[1], now[0], now[1], self._count)
-        grey = LEVEL * light + self._config.noise * self._noise.normal(light.size).reshape(light.shape)
+        grey = self._config.level * light + self._config.noise * self._noise.normal(light.size).reshape(light.shape)
         found = self._tracker.feed(np.clip(np.rint(grey), 0.0, 255.0))
         x, y = self._eye.hit[len(self._eye.hit) // 2]
         reading = FlowReading(

@@ -71,7 +71,7 @@ class Terrain:
                 heights -= heights[scale.rows // 2 - 20 : scale.rows // 2 + 20, middle].mean()
             if config.flat:
                 heights[:] = 0.0
-            layers.append(Layer(scale.cell, heights, _pyramid(light)))
+            layers.append(Layer(scale.cell, heights, pyramid(light)))
         self.layers = tuple(layers)
 
     def height(self, x: float, y: float) -> float:
@@ -88,7 +88,7 @@ class Terrain:
         return tuple((layer.cell, layer.light) for layer in self.layers)
 
 
-def _pyramid(light: np.ndarray) -> tuple[np.ndarray, ...]:
+def pyramid(light: np.ndarray) -> tuple[np.ndarray, ...]:
     """LEVELS of it, each halved by a Gaussian from the one before, wrapping round."""
     import cv2
 
