@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from landing_sim.control.position import Memory, PositionController, PositionSettings
+from landing_sim.control.position import FUSED, Memory, PositionController, PositionSettings
 from landing_sim.estimators.strapdown_ekf import NAMES
 from landing_sim.geometry.so3 import from_euler
 from landing_sim.signals import Command, Estimate, Reference
 
-S = PositionSettings(integral=0.0)
+S = PositionSettings(integral=0.0, bandwidth=3.0, damping=0.9, vertical=3.0, vertical_damping=0.9)
 HOVER = S.mass * S.gravity / S.full_thrust
 
 
@@ -101,7 +101,7 @@ def test_blind_it_flies_velocity_alone() -> None:
 
 def test_integral_by_hand_and_where_it_stops() -> None:
     """k_i wn^3 e = 0.1 x 27 x 0.1 = 0.27 m/s^3: 0.54 after 2 s (100 commands); never more than `trim`."""
-    settings = PositionSettings(integral=0.1, trim=0.8)
+    settings = replace(S, integral=0.1, trim=0.8)
     controller = PositionController(settings)
     memory = controller.init()
     for k in range(100):
@@ -125,7 +125,7 @@ def test_integral_does_not_wind_up_against_a_limit_but_comes_back() -> None:
 
 def test_a_point_mass_in_steady_wind_with_weak_rotors_comes_to_rest_where_it_is_wanted() -> None:
     """3 % less thrust than believed and 0.3 m/s^2 of wind: only the integral finds both."""
-    settings = PositionSettings()
+    settings = FUSED
     controller, memory = PositionController(settings), Memory()
     p, v = np.array([0.3, -0.2, 0.0]), np.zeros(3)
     for k in range(3000):

@@ -52,9 +52,9 @@ class StrapdownConfig:
     attitude : [rad] of the autopilot's angles: said in the covariance, not filtered
     """
 
-    accel: float = 0.1  # [m/s^2/sqrt(Hz)] of the specific force: gusts do not count, they are measured
-    bias: float = 0.02  # [m/s^2/sqrt(s)]
-    position: float = 0.01  # [m/sqrt(s)]
+    accel: float = 0.03  # [m/s^2/sqrt(Hz)] of the specific force; gusts do not count: they are felt
+    bias: float = 0.02  # [m/s^2/sqrt(s)]: the attitude's wandering error, times g
+    position: float = 0.003  # [m/sqrt(s)]
     gravity: float = 9.797  # [m/s^2]
     first_position: float = 0.05
     first_velocity: float = 0.5
