@@ -88,7 +88,7 @@ def test_it_acts_every_period_and_holds_between() -> None:
 
 def test_motors_are_off_on_the_ground_and_after_the_cut() -> None:
     controller = PositionController()
-    memory, _ = controller.step(controller.init(), at(), want(x=0.3))
+    memory, _ = controller.step(controller.init(), at(), want(x=0.1))
     assert memory.integral[0] > 0.0
     for mode in ("wait", "cut"):
         off, command = controller.step(memory, at(0.001), want(mode, x=0.3))
