@@ -158,6 +158,7 @@ def test_a_link_without_memory_begins_anew() -> None:
         ChainNoise(1, "a", [(5, 0.0), (6, 0.5)]),
     )
     assert chain.normal(10).tobytes() == fresh.normal(10).tobytes()
+    assert len(chain._links) == 2  # what is forgotten is not drawn
 
 
 # ------------------------------------------------------------------------------------------------------------ falsifier

@@ -195,8 +195,10 @@ def test_first_order_does_not_depend_on_the_step() -> None:
 
 def test_the_challenges_gains_make_unit_variance_of_its_noise() -> None:
     """10/(2.5 s + 1) and 2.25/(0.125 s + 1) on noise held for 0.05 s, stepped finely: what FirstOrder's sigmas rest on."""
-    for gain, T, wanted in ((10.0, 2.5, 1.0), (2.25, 0.125, 1.0125)):
+    ours = FirstOrder(1.0)
+    for gain, T, wanted in ((10.0, ours.time_level, 1.0), (2.25, ours.time_vertical, 1.0125)):
         assert gain**2 * 0.05 / (2 * T) == pytest.approx(wanted, abs=1e-3)
+    assert ours.sigma_vertical == pytest.approx(1.5 * 1852 / 3600, abs=2e-3)
 
 
 def test_the_two_dryden_standards_describe_the_same_air() -> None:
