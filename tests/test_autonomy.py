@@ -116,14 +116,15 @@ def test_localisation_lost_for_good_lands_blind_and_cuts(mode: str) -> None:
     ("mode", "estimate", "then"),
     [
         ("take_off", {"x": 0.5, "H": 1.0}, "hover"),
-        ("take_off", {"x": 0.5, "H": 0.8}, "take_off"),
-        ("take_off", {"x": 0.5, "H": 1.0, "vz": 0.2}, "take_off"),
+        ("take_off", {"x": 0.5, "H": 0.74}, "take_off"),
+        ("take_off", {"x": 0.5, "H": 1.0, "vz": 0.36}, "take_off"),
         ("hover", {"x": 0.5, "H": 1.0}, "hover"),  # steady, not for long enough
         ("traverse", {"x": 0.5, "H": 1.0}, "traverse"),
         ("traverse", {"x": 0.5, "H": 1.0, "platform": True}, "hover_above"),
         ("hover_above", {"x": 1.2, "y": 0.1, "H": 1.0, "platform": True}, "hover_above"),
         ("descend", {"x": 1.2, "y": 0.1, "H": 0.33}, "descend"),
         ("descend", {"x": 1.2, "y": 0.1, "H": 0.3199}, "cut"),
+        ("descend", {"x": 1.2, "y": 0.23, "H": 0.3199}, "descend"),
         ("cut", {"x": 1.2, "H": 0.3}, "cut"),
         ("cut", {"x": 1.2, "H": 0.3, "localised": False}, "cut"),
         ("refuse", {"x": 0.5, "H": 1.0, "platform": True}, "refuse"),

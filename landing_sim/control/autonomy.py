@@ -32,7 +32,7 @@ class AutonomySettings:
     legs : [m] of the cg over the feet
     clearance : [m] of the feet over the landing place at which motors are cut
     hold : [s] of steady hover before the next leg; steady is within `near` [m] and `slow` [m/s] of what is wanted
-    off : [m] horizontal error at which the descent waits
+    off : [m] horizontal error at which the descent, and the cut, wait
     search : [s] at the traverse's end before the place is given up
     patience : [s] without localisation before the blind landing, at `blind` [m/s] down
     """
@@ -46,9 +46,9 @@ class AutonomySettings:
     descent: float = 0.05
     acceleration: float = 0.4  # [m/s^2] of the wanted point
     hold: float = 3.0
-    near: float = 0.15
-    slow: float = 0.15
-    off: float = 0.15
+    near: float = 0.25
+    slow: float = 0.35
+    off: float = 0.12
     search: float = 5.0
     legs: float = 0.12
     clearance: float = 0.06
@@ -151,7 +151,7 @@ class Autonomy:
             m = m._replace(place=_place(estimate))
             m = m._replace(target=self._target(m, "hover_above"))
             return self._enter(m, "descend", t, self._target(m, "descend")) if held else m
-        if m.mode == "descend" and estimate["H"] + m.place[2] - s.legs <= s.clearance:
+        if m.mode == "descend" and estimate["H"] + m.place[2] - s.legs <= s.clearance and self._above(m, estimate):
             return self._enter(m, "cut", t)
         return m
 
@@ -175,6 +175,9 @@ class Autonomy:
         speed = math.sqrt(estimate["vx"] ** 2 + estimate["vy"] ** 2 + estimate["vz"] ** 2)
         return math.dist(here, m.target) <= s.near and speed <= s.slow and math.dist(m.p, m.target) < 1e-3
 
+    def _above(self, m: Memory, estimate: Estimate) -> bool:
+        return math.hypot(estimate["x"] - m.place[0], estimate["y"] - m.place[1]) <= self.settings.off
+
     def _down(self, m: Memory, t: float) -> bool:
         """Blindly down for so long that the ground must have been reached, twice over."""
         return t - m.since >= 2.0 * self.settings.height / self.settings.blind
@@ -187,7 +190,7 @@ class Autonomy:
         if m.mode in ("wait", "cut", "hold", "refuse") or dt <= 0.0:
             return m
         target = m.target
-        if m.mode == "descend" and math.hypot(estimate["x"] - target[0], estimate["y"] - target[1]) > s.off:
+        if m.mode == "descend" and not self._above(m, estimate):
             target = (target[0], target[1], m.p[2])
         speed = {"take_off": s.climb, "descend": s.descent}.get(m.mode, s.traverse)
         p, v = moved(m.p, m.v, target, speed, s.acceleration, dt)
