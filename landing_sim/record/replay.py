@@ -19,6 +19,7 @@ from landing_sim.geometry.so3 import camera_from_body, from_euler
 from landing_sim.record import overlay, shapes
 from landing_sim.record.channels import ERRORS, RANGING, SERIES, events
 from landing_sim.record.log import FlightLog
+from landing_sim.record.sights import record_sights
 from landing_sim.record.stage import (
     ESTIMATE_COLOUR,
     IMAGE,
@@ -115,6 +116,7 @@ class Recorder:
         """
         self._send()
         record_log(self._stream, log)
+        record_sights(self._stream, log)
         if other is not None:
             body = shapes.aircraft(self._scene.span, self._scene.fuselage)
             self._stream.log("world/other/body", mesh(body, OTHER_COLOUR), static=True)

@@ -32,6 +32,7 @@ class Scene:
     title: str = "landing-sim"
     start: tuple[float, float, float] = (-950.0, -85.0, -51.0)  # [m] p_RB at t = 0: where the watching eye begins
     ranged: bool = False  # the runway's size is not known on board
+    looks: tuple[float, ...] = ()  # [rad] below the body's forward axis, of its optic-flow sensors
 
 
 def draw(stream: rr.RecordingStream, scene: Scene) -> None:
@@ -84,6 +85,8 @@ def blueprint(scene: Scene) -> Any:
     import rerun as rr
     import rerun.blueprint as rrb
 
+    from landing_sim.record import sights
+
     # the whole flight, also where it is longer than the half minute either way that the viewer would show of it
     always = rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
     whole = rrb.TimeAxis(view_range=always)
@@ -121,7 +124,14 @@ def blueprint(scene: Scene) -> Any:
     return rrb.Blueprint(
         rrb.Vertical(
             rrb.Horizontal(chase, image, column_shares=[3, 2]),
-            rrb.Tabs(*([ranging] * scene.ranged), errors, flight, phases, active_tab=0),
+            rrb.Tabs(
+                *([ranging] * scene.ranged),
+                errors,
+                flight,
+                phases,
+                *([sights.views(scene.looks)] if scene.looks else []),
+                active_tab=0,
+            ),
             row_shares=[3, 2],
         ),
         rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing", loop_mode="all"),
