@@ -173,6 +173,7 @@ def check(
 def schema(
     campaign: Annotated[bool, typer.Option("--campaign", help="Of campaign files.")] = False,
     lunar: Annotated[bool, typer.Option("--lunar", help="Of lunar landings.")] = False,
+    quadrotor: Annotated[bool, typer.Option("--quadrotor", help="Of quadrotor landings.")] = False,
 ) -> None:
     """Print the JSON Schema of scenario files, or of campaigns, for editors."""
     from landing_sim import scenario
@@ -180,7 +181,8 @@ def schema(
     if campaign:
         from landing_sim.campaign.file import schema_text
     else:
-        schema_text = partial(scenario.schema_text, "lunar_landing" if lunar else "runway_landing")
+        mission = "lunar_landing" if lunar else "quadrotor_landing" if quadrotor else "runway_landing"
+        schema_text = partial(scenario.schema_text, mission)
 
     typer.echo(schema_text(), nl=False)
 

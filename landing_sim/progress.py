@@ -44,6 +44,9 @@ LABELS = {
     "touchdown_airspeed_mps": "airspeed at touchdown",
     "final_groundspeed_mps": "ground speed at the end",
     "rollout_y_m": "off the centreline on the ground",
+    "hover_rms_m": "rms distance from the hover point",
+    "miss_m": "touchdown from the platform's middle",
+    "touchdown_tilt_deg": "tilt at touchdown",
 }
 UNITS = {"m": "m", "deg": "deg", "mps": "m/s", "percent": "%"}
 
@@ -60,17 +63,25 @@ def shown(scenario: Scenario) -> Iterator[Callable[[Step], None]]:
 
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[state]}"), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        on_runway = scenario.mission == "runway_landing"
-        start = scenario.initial.x_m if on_runway else -850.0
-        total = scenario.runway.length_m - start if on_runway else -start
+        total, gone = _way(scenario)
         task = bar.add_task(escape(scenario.name), total=total, state="compiling, loading")
 
         def watch(step: Step) -> None:
             x, height, airspeed = step.truth.p_RB[0], -step.truth.p_RB[2], step.truth.airspeed
             state = f"{step.reference.mode:9} x {x:6.0f} m  H {height:5.1f} m  {airspeed:4.1f} m/s"
-            bar.update(task, completed=x - start, state=state)
+            bar.update(task, completed=gone(step), state=state)
 
         yield watch
+
+
+def _way(scenario: Scenario) -> tuple[float, Callable[[Step], float]]:
+    """What is to be done, and how much of it is: the way along the ground, or the time that a quadrotor has."""
+    mission = str(scenario.mission)
+    if mission == "quadrotor_landing":
+        return scenario.time.limit_s, lambda step: step.truth.t
+    start = scenario.initial.x_m if mission == "runway_landing" else -850.0
+    total = scenario.runway.length_m - start if mission == "runway_landing" else -start
+    return total, lambda step: float(step.truth.p_RB[0]) - start
 
 
 def _lines() -> Callable[[Step], None]:
@@ -144,7 +155,7 @@ def table(result: dict[str, Any]) -> None:
         bounds = f"{limit[0]:g} ... {limit[1]:g}" if isinstance(limit, list) else f"{limit:g}"
         rows.add_row(
             LABELS.get(criterion["name"], criterion["name"]),
-            "none" if value is None else f"{value:.2f} {unit}",
+            "none" if value is None else f"{value:.{2 if abs(value) >= 0.2 else 3}f} {unit}",
             f"{bounds} {unit}",
             "[green]met[/]" if criterion["passed"] else "[bold red]not met[/]",
             escape(criterion["source"]),
@@ -152,8 +163,10 @@ def table(result: dict[str, Any]) -> None:
     console.print(rows)
     touchdown = result["touchdown"]
     if touchdown:
+        x = touchdown["x_m"]
+        at = f"x {x:.{0 if abs(x) >= 100 else 2}f} m, y {touchdown['y_m']:+.2f} m"
         console.print(
-            f"Touchdown after {touchdown['time_s']:.1f} s at x {touchdown['x_m']:.0f} m, y {touchdown['y_m']:+.2f} m: "
+            f"Touchdown after {touchdown['time_s']:.1f} s at {at}: "
             f"sink {touchdown['sink_rate_mps']:.2f} m/s, {touchdown['airspeed_mps']:.1f} m/s, "
             f"pitch {touchdown['pitch_deg']:.1f} deg, bank {touchdown['bank_deg']:+.1f} deg, "
             f"heading {touchdown['heading_error_deg']:+.1f} deg",

@@ -65,11 +65,7 @@ def fly(
     Raises ScenarioError where the aircraft cannot fly what the scenario wants at the start, ReplayError from the recording.
     """
     if scenario.mission not in MISSIONS:
-        from landing_sim.missions import lunar_flight
-        from landing_sim.sections.lunar import LunarScenario
-
-        assert isinstance(scenario, LunarScenario)
-        return lunar_flight.fly(scenario, watch, recording, live, noise)
+        return _others(scenario, watch, recording, live, noise)
     started = time.perf_counter()
     try:
         mission = MISSIONS[scenario.mission](scenario, vehicle, scenario.seed, scenario.run, noise)
@@ -82,7 +78,13 @@ def fly(
 
         recorder = Recorder(recording, scene(scenario, vehicle), scenario.record.frames_hz, live)
         listeners.append(recorder.add)
-    builder = log.LogBuilder()
+    builder, eyes = log.LogBuilder(), _looks(scenario)
+    sights = None
+    if eyes:
+        from landing_sim.record.sights import Sights
+
+        sights = Sights(eyes)
+        listeners.append(sights.add)
     for step in mission.steps():
         builder.add(step)
         for listener in listeners:
@@ -96,9 +98,34 @@ def fly(
         runway={"width_m": scenario.runway.width_m, "length_m": scenario.runway.length_m},
         extra={"reason": outcome.reason} if outcome.reason else None,
     )
+    if sights is not None:
+        sights.into(flown)
     if recorder is not None:
         recorder.close(flown, other)
     return Flight(flown, judge.judge(flown, limits(scenario)), time.perf_counter() - started)
+
+
+def _others(
+    scenario: Any,
+    watch: Callable[[Step], None] | None,
+    recording: Path | None,
+    live: bool,
+    noise: Callable[[str], NoiseStream] | None,
+) -> Flight:
+    """Missions that bring a flight of their own; each loads what only it needs."""
+    if scenario.mission == "lunar_landing":
+        from landing_sim.missions import lunar_flight
+
+        return lunar_flight.fly(scenario, watch, recording, live, noise)
+    from landing_sim.missions import quadrotor_flight
+
+    return quadrotor_flight.fly(scenario, watch, recording, live, noise)
+
+
+def _looks(scenario: Scenario) -> tuple[float, ...]:
+    """[rad] below the body's forward axis, where the optic-flow sensors truly look."""
+    flow = scenario.sensors.optic_flow
+    return tuple(math.radians(angle + flow.mounting_error_deg) for angle in flow.angles_deg)
 
 
 def scene(scenario: Scenario, vehicle: Vehicle) -> Scene:
@@ -123,6 +150,7 @@ def scene(scenario: Scenario, vehicle: Vehicle) -> Scene:
         fuselage=vehicle.size.length_m,
         markings=runway.markings,
         ranged=scenario.filter.kind == "observer",
+        looks=_looks(scenario),
         start=(start.x_m, start.y_m, -start.height_m),
         title=f"{scenario.name}, seed {scenario.seed}",
     )

@@ -24,6 +24,7 @@ from landing_sim.sections.faults import Fault
 from landing_sim.sections.judged import LANDING, Criterion, Record
 from landing_sim.sections.lunar import LunarScenario
 from landing_sim.sections.onboard import Believed, Control, Filter, Guidance, Observer, Vision
+from landing_sim.sections.quadrotor import QuadrotorScenario
 from landing_sim.sections.sensors import Camera, Sensors
 from landing_sim.sections.wind import Wind
 from landing_sim.sections.world import Aircraft, Atmosphere, Initial, Runway, Time
@@ -117,7 +118,11 @@ def _whole(period: float, unit: float) -> bool:
     return abs(period - count * unit) <= 1e-9 * max(period, unit) and (count > 0 or period == 0)
 
 
-MODELS: dict[str, Any] = {"runway_landing": Scenario, "lunar_landing": LunarScenario}
+MODELS: dict[str, Any] = {
+    "runway_landing": Scenario,
+    "lunar_landing": LunarScenario,
+    "quadrotor_landing": QuadrotorScenario,
+}
 """What each word of `mission` is checked against."""
 
 
@@ -143,7 +148,7 @@ def load(name: str | Path, overrides: Iterable[str] = ()) -> Scenario:
 
 
 def check(document: yamlfile.Document) -> Scenario:
-    """A document as the scenario its mission asks for: of a lunar descent, a LunarScenario.
+    """A document as the scenario its mission asks for, by MODELS.
 
     Raises ConfigError holding every problem with its place.
     """
@@ -167,7 +172,7 @@ def schema(mission: str = "runway_landing") -> dict[str, Any]:
 
 
 def schema_text(mission: str = "runway_landing") -> str:
-    """`schema()` as it is shipped in scenarios/schema.json; of a lunar landing, in schema_lunar.json."""
+    """`schema()` as it is shipped in scenarios/schema.json; of other missions, schema_lunar.json, schema_quadrotor.json."""
     return json.dumps(schema(mission), indent=1, ensure_ascii=False) + "\n"
 
 

@@ -48,7 +48,7 @@ def test_defaults_are_the_acceptance_setting(tmp_path: Path) -> None:
 def test_shipped_scenarios_load_and_name_their_schema(name: str) -> None:
     file = paths.scenario_file(name)
     s = scenario.load(name)
-    schema = "schema" if s.mission == "runway_landing" else "schema_lunar"
+    schema = {"runway_landing": "schema", "lunar_landing": "schema_lunar"}.get(s.mission, "schema_quadrotor")
     assert file.read_text().startswith(f"# yaml-language-server: $schema=../{schema}.json\n")
     assert s.description
     again = scenario.MODELS[s.mission].model_validate_json(json.dumps(scenario.dump(s)))
@@ -79,6 +79,9 @@ def test_shipped_schema_is_the_models() -> None:
     lunar = paths.data_folder("scenarios") / "schema_lunar.json"
     told = "run: landing-sim schema --lunar > scenarios/schema_lunar.json"
     assert lunar.read_text() == scenario.schema_text("lunar_landing"), told
+    quadrotor = paths.data_folder("scenarios") / "schema_quadrotor.json"
+    told = "run: landing-sim schema --quadrotor > scenarios/schema_quadrotor.json"
+    assert quadrotor.read_text() == scenario.schema_text("quadrotor_landing"), told
 
 
 def test_every_value_is_described() -> None:

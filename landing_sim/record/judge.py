@@ -16,7 +16,10 @@ import numpy as np
 from landing_sim.record.log import RIGID, FlightLog
 from landing_sim.types import Array
 
-Outcome = Literal["landed", "go_around", "crash", "off_runway", "timeout", "numeric_error"]
+Outcome = Literal[
+    "landed", "go_around", "crash", "off_runway", "timeout", "numeric_error", "hovered", "off_platform", "refused"
+]
+"""The last three are a quadrotor's: stayed where it was meant to, landed elsewhere, found no landing place."""
 
 SETTLING = 1.5  # [s] after acquisition, before errors count
 FAR = 500.0  # [m] beyond which range is judged in percent
@@ -57,7 +60,7 @@ class Verdict:
 
     @property
     def passed(self) -> bool:
-        return self.outcome == "landed" and all(criterion.passed for criterion in self.criteria)
+        return self.outcome in ("landed", "hovered") and all(criterion.passed for criterion in self.criteria)
 
 
 def judge(log: FlightLog, limits: Iterable[Limit] = ()) -> Verdict:

@@ -35,10 +35,10 @@ from landing_sim.types import Array
 SCHEMA = 1
 
 UNITS = (
-    dict.fromkeys(("u", "v", "w", "wx", "wy", "wz"), "mps")
+    dict.fromkeys(("u", "v", "w", "vx", "vy", "vz", "wx", "wy", "wz"), "mps")
     | dict.fromkeys(("p", "q", "r", "bp", "bq", "br"), "radps")
     | dict.fromkeys(("phi", "theta", "psi"), "rad")
-    | dict.fromkeys(("x", "y", "H", "W"), "m")
+    | dict.fromkeys(("x", "y", "H", "W", "lx", "ly", "lH"), "m")
 )
 """Unit suffix of every name an `Estimate` may carry; another name is logged as it is."""
 
