@@ -21,7 +21,7 @@ from landing_sim.vision.slam.tracking import Tracked, look
 from landing_sim.vision.slam.two_view import meet
 
 CELLS = 12  # across the image, each with
-PER_CELL = 3  # points
+PER_CELL = 4  # points
 SPACING = 3.0  # [px] between the places in the other keyframe that a new point is tried at
 NEAR, FAR = 0.3, 1.4  # [height above the ground] depths tried
 WORST = 3.0  # [px of the level] an observation further off after bundle adjustment is a mistake

@@ -36,6 +36,11 @@ class Fit(NamedTuple):
     cov: Array  # (6, 6) of small turns of C [rad] and of p_RC [m]
 
 
+def turned(R_1: Array, R_2: Array) -> float:
+    """[rad] the angle between two attitudes (3, 3)."""
+    return math.acos(min(1.0, max(-1.0, 0.5 * (float(np.sum(R_1 * R_2)) - 1.0))))
+
+
 def fit_pose(start: Pose, X: Array, uv: Array, size: Array, f: float, cx: float, cy: float) -> Fit | None:
     """Pose from points X (n, 3) found at uv (n, 2) [px], with standard deviations in the ratio of size (n,).
 

@@ -15,13 +15,13 @@ import numpy as np
 from landing_sim.types import Array
 from landing_sim.vision.slam.corners import Pyramid
 from landing_sim.vision.slam.map import THUMB, Map, thumb
-from landing_sim.vision.slam.pose import Pose
+from landing_sim.vision.slam.pose import Pose, turned
 from landing_sim.vision.slam.settings import SlamSettings
 from landing_sim.vision.slam.tracking import Tracked, track
 
 CANDIDATES = 3
 ASKED = 0.5  # of the points looked for must be found: a wrong place finds few
-LEAST = 40
+LEAST = 40  # points
 
 
 def relocate(chart: Map, levels: Pyramid, R_CR: Array, settings: SlamSettings, p_said: Array | None) -> Tracked | None:
@@ -36,7 +36,9 @@ def relocate(chart: Map, levels: Pyramid, R_CR: Array, settings: SlamSettings, p
         for dx, dy in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)):
             start = Pose(R_CR, place + step * np.array([dx, dy, 0.0]))
             found = track(chart, levels, start, settings, settings.fine_points, coarser=1)
-            if found is not None and len(found.point) >= max(LEAST, ASKED * found.asked):
+            if found is None or turned(found.pose.R_CR, R_CR) > settings.most_turn:
+                continue
+            if len(found.point) >= max(LEAST, ASKED * found.asked):
                 return found
     return None
 

@@ -32,8 +32,8 @@ class SlamSettings:
 
     fast_threshold: int = 8  # grey levels a corner must stand out by
     coarse_points: int = 60
-    fine_points: int = 220  # measured in a frame that only tracks
-    keyframe_points: int = 320  # measured in a keyframe: without a cap, bundle adjustment grows with the map
+    fine_points: int = 320  # measured in a frame that only tracks
+    keyframe_points: int = 400  # measured in a keyframe: without a cap, bundle adjustment grows with the map
     coarse_half: int = 4  # patches of 9 x 9
     fine_half: int = 5  # 11 x 11
     coarse_reach: float = 6.0  # [px of the coarse level]
@@ -49,6 +49,10 @@ class SlamSettings:
     level_ground: bool = (
         True  # take the ground for level (it is what sonar heights mean), not the inertial unit's vertical
     )
+    start_heading: float | None = (
+        0.0  # [rad] psi at the first image, which is what R is named after; None: what the unit says
+    )
+    most_turn: float = 0.06  # [rad] a pose that differs more from the inertial unit's attitude is a mistake
     sonar_outlier: float = 0.06  # [m]
     window: int = 0  # keyframes kept; 0: all
     position_floor: float = 0.004  # [m] standard deviation that no position is better than

@@ -19,7 +19,7 @@ from landing_sim.types import Array
 from landing_sim.vision.slam import growth, scale, start
 from landing_sim.vision.slam.corners import Pyramid, pyramid
 from landing_sim.vision.slam.map import Map
-from landing_sim.vision.slam.pose import Pose
+from landing_sim.vision.slam.pose import Pose, turned
 from landing_sim.vision.slam.relocation import relocate
 from landing_sim.vision.slam.settings import Rig, SlamSettings
 from landing_sim.vision.slam.tracking import Tracked, track
@@ -76,6 +76,7 @@ class Slam:
         self.located: Located | None = None  # of the latest image, None if it could not be placed
         self._first: start.Beginning | None = None
         self._failures = 0
+        self._heading: float | None = None  # [rad] to be added to the inertial unit's
         self._last: Pose | None = None
         self._last_t, self._velocity = -math.inf, np.zeros(3)
         self._R_last = np.eye(3)  # R_CR that the inertial unit told with _last
@@ -100,6 +101,10 @@ class Slam:
         if not np.isfinite(euler).all():
             raise ValueError(f"slam: the attitude at t = {t} s is not finite: {np.asarray(euler).tolist()}")
         levels = pyramid(image)
+        if self._heading is None:
+            asked = self.settings.start_heading if self.mode == "map" else None
+            self._heading = 0.0 if asked is None else asked - float(euler[2])
+        euler = np.array([euler[0], euler[1], euler[2] + self._heading])
         R_said = self.rig.R_CB @ from_euler(*map(float, euler)).T
         self.located = None
         if self.status == "starting":
@@ -120,7 +125,7 @@ class Slam:
             growth.adjust_all(self.chart)
         return self.chart
 
-    # ------------------------------------------------------------------------------------------------- start
+    # --- start
 
     def _start(self, t: float, euler: Array, R_said: Array, levels: Pyramid, p_said: Array | None) -> Tracked | None:
         if self._first is not None:
@@ -151,7 +156,7 @@ class Slam:
         self.status = "tracking"
         return track(self.chart, levels, self.chart.pose(1), self.settings, self.settings.fine_points)
 
-    # ---------------------------------------------------------------------------------------------- tracking
+    # --- tracking
 
     def _track(self, t: float, R_said: Array, levels: Pyramid, p_said: Array | None) -> Tracked | None:
         s = self.settings
@@ -161,9 +166,11 @@ class Slam:
             p = self._last.p_RC + self._velocity * (dt if dt < GAP else 0.0)
             guess = Pose(R_said @ self._R_last.T @ self._last.R_CR, p)
             most = s.fine_points if self.mode == "localise" or not self._far(p) else s.keyframe_points
-            seen = track(self.chart, levels, guess, s, most)
-            if seen is None:
-                seen = track(self.chart, levels, guess, s, most, coarser=1)
+            for coarser in (0, 1):
+                seen = track(self.chart, levels, guess, s, most, coarser)
+                if seen is not None and turned(seen.pose.R_CR, guess.R_CR) < s.most_turn:
+                    break
+                seen = None
         if seen is None:
             self._failures += 1
             self.reason = f"{self._failures} frames in a row did not match the map"
@@ -201,7 +208,7 @@ class Slam:
             self.chart.X[seen.point], seen.sigma, self.chart.metric,
         )  # fmt: skip
 
-    # ----------------------------------------------------------------------------------------------- mapping
+    # --- mapping
 
     def _height(self, seen: Tracked) -> float:
         """[m] of the camera above what it sees."""

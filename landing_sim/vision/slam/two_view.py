@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from landing_sim.types import Array
+from landing_sim.vision.slam.pose import turned
 
 WINDOW, LEVELS = (15, 15), 3  # of the optical flow
 ENOUGH = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 0.01)
@@ -67,7 +68,7 @@ def plane_motion(rays_1: Array, rays_2: Array, R_said: Array, down_1: Array) -> 
         t, n = t.ravel(), n.ravel()
         if n[2] < 0.0:
             t, n = -t, -n
-        turn = np.arccos(np.clip(0.5 * (np.trace(R @ R_said.T) - 1.0), -1.0, 1.0))
+        turn = turned(R, R_said)
         tilt = np.arccos(np.clip(n @ down_1, -1.0, 1.0))
         if turn < MOST_TURN and tilt < MOST_TILT and turn + tilt < least:
             best, least = Motion(R, t, n, int(inlier.sum())), turn + tilt
