@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import flights
 import numpy as np
@@ -10,12 +12,16 @@ import pytest
 from flights import approach, fly, worst
 
 from landing_sim import runner, scenario, vehicle
+from landing_sim.interfaces import Estimator
+from landing_sim.missions import runway_landing
 from landing_sim.plants.aircraft import JsbsimPlant
 from landing_sim.plants.jsbsim import PlantError
 from landing_sim.record import parquet
+from landing_sim.signals import Estimate
 
 MOUTHS = "runway.taxiways=[{x_m: 60, width_m: 12, side: left, flare_m: 3}, {x_m: 400, side: right}]"
 STRAIGHT_IN = ("initial.y_m=0", "initial.heading_deg=0")
+STATES = ("u", "v", "w", "p", "q", "r", "phi", "theta", "psi", "x", "y", "H", "wx", "wy", "wz")
 
 
 @pytest.mark.parametrize("name", ["calm", "gust", "gust_light", "gust_moderate", "headwind", "tailwind"])
@@ -180,3 +186,37 @@ def test_compensated_image_age_lands_the_gust_and_uncompensated_does_not() -> No
     assert rewound.verdict.metrics["range_far_percent"] < 0.5
     naive = fly("do128/gust", "camera.latency_s=0.12", "filter.compensate_latency=false")
     assert not naive.verdict.passed
+
+
+class Oracle:
+    """An estimator in whose place the truth is read: what a perfect estimate would be worth."""
+
+    def __init__(self, inner: Estimator, plant: JsbsimPlant) -> None:
+        self.inner, self.plant = inner, plant
+        self.init, self.predict, self.update = inner.init, inner.predict, inner.update
+
+    def read(self, memory: Any, t: float | None = None) -> Estimate:
+        estimate = self.inner.read(memory, t)
+        if t is not None or not estimate.valid:
+            return estimate
+        now, mean = self.plant.truth(), estimate.mean.copy()
+        x, y, z = now.p_RB
+        states = (*(now.R_RB.T @ now.v_RB_R), *now.w_RB_B, *now.euler, x, y, -z, *now.wind_R)
+        for name, value in zip(STATES, states, strict=True):
+            mean[estimate.names.index(name)] = value
+        return replace(estimate, mean=mean)
+
+
+def test_the_hardest_landing_in_turbulence_is_not_the_estimates_doing() -> None:
+    """Seed 89 of gust_moderate, the one of 120 that touches down at more than 1.5 m/s: knowing all does not help it."""
+    wanted = scenario.load("do128/gust_moderate", ["seed=89"])
+    mission = runway_landing.build(wanted, vehicle.load("do128"), 89)
+    plant = mission.parts.plant
+    mission.parts = replace(mission.parts, estimator=Oracle(mission.parts.estimator, plant))
+    end = next(step for step in mission.steps() if plant.touchdown is not None)
+    assert end.estimate["wx"] == pytest.approx(end.truth.wind_R[0])
+    assert plant.touchdown is not None
+    flown = fly("do128/gust_moderate", seed=89).log.touchdown
+    assert flown is not None
+    assert plant.touchdown.sink_rate > 1.5
+    assert flown.sink_rate == pytest.approx(plant.touchdown.sink_rate, abs=0.2)
