@@ -110,6 +110,23 @@ def test_near_the_ground_less_of_a_height_error_is_flown_back(height: float, sha
     assert reference.height - H == pytest.approx(-0.5 * share, abs=1e-6)
 
 
+def test_a_straight_end_keeps_its_slope_and_past_it_engines_idle() -> None:
+    """From 1 m on, at the slope that the exponential has there: 4 / L; 0 at the touchdown point, below it beyond."""
+    guidance = LandingGuidance(replace(SETTINGS, path=replace(SETTINGS.path, straight_from_m=1.0)))
+    path = guidance.path
+    straight = 4.0 / path.length
+    x = 550.0 - 1.0 / straight
+    assert path.height(x - 1e-6)[0] == pytest.approx(1.0, abs=1e-6)
+    assert path.height(x - 1e-6)[1] == pytest.approx(-straight, abs=1e-8)
+    assert path.height(550.0) == pytest.approx((0.0, -straight, 0.0), abs=1e-9)
+    assert path.height(650.0) == pytest.approx((-100.0 * straight, -straight, 0.0), abs=1e-9)
+    memory = GuidanceMemory("decrab", 0.0, 0.0)
+    for at, idle in ((540.0, 0.0), (560.0, 1.0)):
+        _, reference = fly(guidance, memory, estimate(0.06, x=at - 0.6, H=2.3))
+        assert reference.extra["idle"] == idle
+        assert fly(LandingGuidance(SETTINGS), memory, estimate(0.06, x=at - 0.6, H=2.3))[1].extra["idle"] == 0.0
+
+
 def test_hold_off_that_cannot_be() -> None:
     with pytest.raises(ValueError, match="from_height_m must be above"):
         HoldOffSettings(from_height_m=3.0, to_height_m=3.0, share=0.4)

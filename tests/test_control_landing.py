@@ -15,7 +15,7 @@ from landing_sim import paths, vehicle
 from landing_sim.control.believed import believed, motion
 from landing_sim.control.design import Design, DesignError, LinearModel, design, design_dict, design_report
 from landing_sim.control.guidance import LandingGuidance
-from landing_sim.control.landing_lq import LandingController, ThrustMap, _limited
+from landing_sim.control.landing_lq import LandingController, ThrustMap, _followed, _limited
 from landing_sim.control.rollout import Rollout, RolloutMemory
 from landing_sim.control.settings import GustSettings, RolloutSettings
 from landing_sim.geometry.earth import RunwayFrame
@@ -462,3 +462,12 @@ def test_commands_are_smoothed_before_their_rate_is_limited() -> None:
     assert _limited(1.0, 0.0, 0.04, 9.0, 2.0, 0.06) == pytest.approx(0.08)
     assert _limited(1.0, 0.0, 0.04, 0.3, 99.0, 0.0) == pytest.approx(0.3)
     assert _limited(1.0, 0.0, 0.0, 9.0, 2.0, 0.06) == 1.0  # no cycle before it
+
+
+def test_a_surface_turns_when_its_command_does() -> None:
+    """Limited to 0.1 a cycle: 0.5 asked at once gives 0.1; 0.3 then turns it to 0.0, and what is owed comes slowly."""
+    assert _followed(0.5, 0.0, 0.0, 0.1, 9.0, 1.0, 0.9) == pytest.approx(0.1)
+    assert _followed(0.3, 0.5, 0.1, 0.1, 9.0, 1.0, 0.9) == pytest.approx(0.1 - 0.1)  # -0.2 + 0.1 (0.5 - 0.1), limited
+    assert _followed(0.3, 0.3, 0.0, 0.1, 9.0, 1.0, 0.9) == pytest.approx(0.03)
+    assert _followed(0.35, 0.3, 0.3, 0.1, 9.0, 1.0, 0.9) == pytest.approx(0.35)  # nothing owed: as asked
+    assert _followed(0.35, 0.3, 0.3, 0.1, 0.32, 1.0, 0.9) == pytest.approx(0.32)

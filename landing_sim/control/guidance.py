@@ -53,15 +53,31 @@ class Path:
     approach: float  # [m/s]
     touchdown: float
     rise: float = 0.0  # tangent of the runway's slope, > 0 uphill
+    straight_x: float = math.inf  # [m] from where the level flare's slope stays as it is
 
     @staticmethod
     def from_settings(s: PathSettings, rise: float = 0.0) -> Path:
         slope = math.tan(math.radians(s.glide_deg))
         top = s.flare_height_m + s.sink_height_m
         length = top / slope
-        flare_x = s.touchdown_x_m - length * math.log(top / s.sink_height_m)
+        straight_x = math.inf
+        if s.straight_from_m is None:
+            flare_x = s.touchdown_x_m - length * math.log(top / s.sink_height_m)
+        else:
+            left = s.straight_from_m + s.sink_height_m
+            straight_x = s.touchdown_x_m - length * s.straight_from_m / left
+            flare_x = straight_x - length * math.log(top / left)
         return Path(
-            slope, flare_x, top, length, s.sink_height_m, s.touchdown_x_m, s.approach_mps, s.touchdown_mps, rise
+            slope,
+            flare_x,
+            top,
+            length,
+            s.sink_height_m,
+            s.touchdown_x_m,
+            s.approach_mps,
+            s.touchdown_mps,
+            rise,
+            straight_x,
         )
 
     def height(self, x: float) -> tuple[float, float, float]:
@@ -72,8 +88,10 @@ class Path:
         """
         if x <= self.flare_x:
             return self.top - self.sink_height + (self.flare_x - x) * self.slope, -self.slope, 0.0
-        falling = self.top * math.exp(-(x - self.flare_x) / self.length)
+        falling = self.top * math.exp(-(min(x, self.straight_x) - self.flare_x) / self.length)
         level = falling - self.sink_height, -falling / self.length, falling / self.length**2
+        if x > self.straight_x:
+            level = level[0] + (x - self.straight_x) * level[1], level[1], 0.0
         a, into = -self.flare_x, x - self.flare_x
         if into >= 2.0 * a:
             return level[0] + self.rise * x, level[1] + self.rise, level[2]
@@ -218,6 +236,7 @@ class LandingGuidance:
             "downdraught": memory.downdraught,  # [m/s] what pitch is to be corrected for
             "wheel_height": height,  # [m]
             "on_path": float(abs(over_path) < limit),
+            "idle": float(wheel_x > path.touchdown_x and math.isfinite(path.straight_x)),
         }
         return Reference(memory.mode, V, b.H + error, slope * m.x_dot, y, psi, phi, 0.0, r, extra)
 

@@ -40,14 +40,15 @@ class ControlMemory:
     aileron: float = 0.0
     rudder: float = 0.0
     tailwind: float = math.nan  # [m/s] smoothed, along the nose
+    asked: float = math.nan  # [rad] of the elevator, before its limits; where these are recovered from slowly
     rollout: RolloutMemory = ON_TOUCHDOWN
 
 
 class LandingController:
     """interfaces.Controller. Constants only; all memory is in ControlMemory."""
 
-    __slots__ = ("_camera", "_flaps", "_ground_effect", "_gust", "_integral", "_limits", "_look", "_per_gust", "_rollout",
-                 "_schedule", "_slowest", "_thrust", "_trim")  # fmt: skip
+    __slots__ = ("_camera", "_flaps", "_ground_effect", "_gust", "_integral", "_limits", "_look", "_per_gust", "_recovery",
+                 "_rollout", "_schedule", "_slowest", "_thrust", "_trim")  # fmt: skip
 
     def __init__(self, design: Design, look: tuple[float, float] = (0.0, 0.0)) -> None:
         """look: pan and tilt [rad] that the platform is held at until the runway is found."""
@@ -60,6 +61,7 @@ class LandingController:
         self._trim = (float(approach.inputs[0]), self._thrust.throttle(float(approach.inputs[1]), approach.airspeed))
         self._limits = tuple((math.radians(a.max_deg), math.radians(a.rate_dps), a.smoothing_s)
                              for a in (s.elevator, s.aileron, s.rudder))  # fmt: skip
+        self._recovery = s.elevator.recovery_s
         self._integral = (s.integral_limits["int_V"], s.integral_limits["int_H"])
         c = s.camera
         self._camera, self._look = (math.radians(c.elevation_deg), math.radians(c.max_deg)), look
@@ -98,10 +100,18 @@ class LandingController:
             elevator, throttle, aileron, rudder, int_V, int_H = self._fly(memory, b, m, reference, dt, gust)
             ground, left, right, flap = ON_TOUCHDOWN, 0.0, 0.0, self._flaps[0]
         last = memory.elevator if memory.elevator == memory.elevator else elevator
-        elevator = _limited(elevator, last, dt, *self._limits[0])
+        asked = math.nan
+        if self._recovery > 0.0:
+            before = memory.asked if math.isfinite(memory.asked) else last
+            asked = _smoothed(elevator, before, dt, self._limits[0][2])
+            elevator = _followed(asked, before, last, dt, *self._limits[0][:2], self._recovery)
+        else:
+            elevator = _limited(elevator, last, dt, *self._limits[0])
         aileron = _limited(aileron, memory.aileron, dt, *self._limits[1])
         rudder = _limited(rudder, memory.rudder, dt, *self._limits[2])
-        memory = ControlMemory(estimate.t, reference.mode, int_V, int_H, elevator, aileron, rudder, tailwind, ground)
+        memory = ControlMemory(
+            estimate.t, reference.mode, int_V, int_H, elevator, aileron, rudder, tailwind, asked, ground
+        )
         return memory, Command(
             elevator, aileron, rudder, throttle, flap, left, right, _clip(pan, most), _clip(tilt, most)
         )
@@ -166,6 +176,8 @@ class LandingController:
         if not 0.0 <= throttle <= 1.0:
             int_V = memory.int_V if (throttle > 1.0) == (e_V < 0.0) else int_V
             throttle = min(max(throttle, 0.0), 1.0)
+        if extra("idle", 0.0):
+            int_V, throttle = memory.int_V, 0.0
         if abs(elevator) > self._limits[0][0] or not extra("on_path", 1.0):
             int_H = memory.int_H
         slip = V * extra("sideslip", 0.0)
@@ -219,6 +231,24 @@ def _limited(value: float, last: float, dt: float, limit: float, rate: float, sm
     Noise that runs a servo at its rate limit takes the loop's phase: it is kept from it.
     """
     if dt > 0.0:
-        value = last + dt / (dt + smoothing) * (value - last)
+        value = _smoothed(value, last, dt, smoothing)
         value = min(max(value, last - rate * dt), last + rate * dt)
     return min(max(value, -limit), limit)
+
+
+def _smoothed(value: float, last: float, dt: float, smoothing: float) -> float:
+    return last + dt / (dt + smoothing) * (value - last) if dt > 0.0 else value
+
+
+def _followed(asked: float, before: float, last: float, dt: float, limit: float, rate: float, recovery: float) -> float:
+    """Next command after `last`, where `asked` has come after `before`: the changes of what is asked, within the limits,
+    and what these kept back, with the time constant `recovery` [s].
+
+    Where no limit was met it is what is asked for. A limiter that makes for what is asked at its full rate goes on away
+    from it until the two meet, long after it has turned back: with an elevator that is fast to saturate that is a lag of
+    90 deg, and the aircraft is kept swinging.
+
+    Source     The idea of phase-compensated rate limiting (Rundqwist & Stahl-Gunnarsson 1996), reduced to one state.
+    """
+    step = asked - before + dt / (dt + recovery) * (before - last)
+    return min(max(last + min(max(step, -rate * dt), rate * dt), -limit), limit)

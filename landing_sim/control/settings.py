@@ -98,19 +98,25 @@ class ThrustSettings:
 
 @dataclass(frozen=True, slots=True)
 class LimitSettings:
-    """Believed limits of one control surface, about zero, and the time constant its commands are smoothed with."""
+    """Believed limits of one control surface, about zero, and the time constant its commands are smoothed with.
+
+    recovery_s, of the elevator only: a command that outran the rate limit is followed in its changes at once, in what is
+    left of it with this time constant, so that a surface turns when its command does; 0 catches up at the full rate, which
+    comes late by up to a quarter of a swing.
+    """
 
     max_deg: float
     rate_dps: float
     lag_s: float
     smoothing_s: float = 0.0
+    recovery_s: float = 0.0
 
     __pydantic_config__ = _STRICT
 
     def __post_init__(self) -> None:
         _positive(max_deg=self.max_deg, rate_dps=self.rate_dps)
-        if not self.smoothing_s >= 0.0:
-            raise ValueError("smoothing_s must be 0 or more")
+        if not (self.smoothing_s >= 0.0 and self.recovery_s >= 0.0):
+            raise ValueError("smoothing_s and recovery_s must be 0 or more")
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,6 +291,7 @@ class PathSettings:
     touchdown_mps: float
     height_error_limit_m: float  # larger deviations are flown back at this one's rate
     hold_off: HoldOffSettings | None = None
+    straight_from_m: float | None = None  # from this height the path keeps its slope, past its end with idling engines
     turbulence_share: float = 0.0  # of the wind at 20 ft that goes with reported turbulence, added to touchdown_mps
 
     __pydantic_config__ = _STRICT
