@@ -56,6 +56,6 @@ class Fresh:
         self.front_end, self.oldest = front_end, oldest
 
     def process(self, sample: Sample, estimate: Callable[[], Estimate]) -> tuple[Measurement, ...]:
-        if sample.t_arrival - sample.t_valid > self.oldest:
+        if sample.t_arrival - sample.t_valid > self.oldest + 1e-9:
             return ()
         return self.front_end.process(sample, estimate)
