@@ -21,7 +21,7 @@ from landing_sim.plants.attitude_loop import AttitudeConfig
 from landing_sim.plants.jsbsim import PlantError
 from landing_sim.plants.quadrotor import QuadrotorPlant, Start
 from landing_sim.sections.quadrotor import Platform, QuadrotorScenario
-from landing_sim.sensors.latency import LatencyConfig
+from landing_sim.sensors.latency import Latency, LatencyConfig
 from landing_sim.sensors.place_fix import PlaceFix, PlaceFixConfig
 from landing_sim.sensors.position_fix import PositionFix, PositionFixConfig
 from landing_sim.sensors.sonar import Sonar, SonarConfig
@@ -163,12 +163,14 @@ def _above(boxes: tuple[Box, ...]) -> Callable[[float, float], float]:
     return height
 
 
-def _plant(s: QuadrotorScenario, boxes: tuple[Box, ...], streams: Callable[[str], NoiseStream]) -> QuadrotorPlant:
+def _plant(
+    s: QuadrotorScenario, boxes: tuple[Box, ...], streams: Callable[[str], NoiseStream], start: Start | None = None
+) -> QuadrotorPlant:
     v = s.vehicle
     firmware = AttitudeConfig(bias=math.radians(v.attitude_bias_deg), wander=math.radians(v.attitude_wander_deg))
     return QuadrotorPlant(
         paths.data_folder("aircraft") / "pelican",
-        Start(),
+        start or Start(),
         _above(boxes),
         s.time.step_s,
         streams("firmware"),
@@ -183,26 +185,65 @@ def _eyes(
     s: QuadrotorScenario, plant: QuadrotorPlant, boxes: tuple[Box, ...], streams: Callable[[str], NoiseStream]
 ) -> tuple[list[Sensor], dict[str, FrontEnd]]:
     """The sensors, and their front ends."""
-    late, l = s.camera.latency, s.localisation
+    late = s.camera.latency
     latency = LatencyConfig(late.mean_s, late.jitter_s, late.spike_share, late.spike_low_s, late.spike_high_s)
     imu = StrapdownConfig(noise=s.sensors.imu.noise_mps2, bias_sigma=s.sensors.imu.bias_mps2)
     sonar = SonarConfig(noise=s.sensors.sonar.noise_m, loss=s.sensors.sonar.loss)
+    sensors: list[Sensor] = [Strapdown(imu, plant, streams("imu")), Sonar(sonar, _above(boxes), streams("sonar"))]
+    front_ends: dict[str, FrontEnd] = {"imu": StrapdownFrontEnd()}
+    more = (
+        _emulated(s, latency, boxes, streams)
+        if s.localisation.kind == "emulated"
+        else _seeing(s, latency, boxes, streams)
+    )
+    sensors += more[0]
+    return sensors, {**front_ends, **more[1]}
+
+
+Eyes = tuple[list[Sensor], dict[str, FrontEnd]]
+
+
+def _emulated(
+    s: QuadrotorScenario, latency: LatencyConfig, boxes: tuple[Box, ...], streams: Callable[[str], NoiseStream]
+) -> Eyes:
+    """Positions and the landing place without images."""
+    l = s.localisation
     fix = PositionFixConfig(s.camera.period_s, latency, l.noise_m, l.wander_m, scale=l.scale_sigma)
-    sensors: list[Sensor] = [
-        Strapdown(imu, plant, streams("imu")),
-        Sonar(sonar, _above(boxes), streams("sonar")),
-        PositionFix(fix, streams("position_fix"), streams("latency")),
-    ]
-    believed = math.hypot(l.noise_m, l.wander_m)
-    front_ends: dict[str, FrontEnd] = {
-        "imu": StrapdownFrontEnd(),
-        "position_fix": Fresh(Reading("position_fix", "position", max(believed, 1e-3)), s.filter.horizon_s),
-    }
+    sensors: list[Sensor] = [PositionFix(fix, streams("position_fix"), streams("latency"))]
+    reading = Reading("position_fix", "position", max(math.hypot(l.noise_m, l.wander_m), 1e-3))
+    front_ends: dict[str, FrontEnd] = {"position_fix": Fresh(reading, s.filter.horizon_s)}
     if s.task == "land":
         place = PlaceFixConfig(s.camera.period_s, latency)
         sensors.append(PlaceFix(place, boxes[0].corners(), streams("place_fix"), streams("place_latency")))
         front_ends["place_fix"] = Fresh(Reading("place_fix", "way_point", place.bias), s.filter.horizon_s)
     return sensors, front_ends
+
+
+def _seeing(
+    s: QuadrotorScenario, latency: LatencyConfig, boxes: tuple[Box, ...], streams: Callable[[str], NoiseStream]
+) -> Eyes:
+    """Positions and the landing place from rendered images, on a map that was made before."""
+    from landing_sim.missions import quadrotor_eyes as eyes  # half a second of imports that campaigns can do without
+
+    place = scene(s)
+
+    def made() -> eyes.Map:
+        by_hand = Start(height=s.path.height_m)
+        plant = _plant(s, boxes, lambda name: Noise(s.scene.seed, f"survey {name}"), by_hand)
+        return eyes.survey(s, plant, boxes, place)
+
+    chart = eyes.chart(s, made)
+    slam = eyes.Slam(eyes.rig(s), eyes.settings(s), "both" if s.localisation.mapping else "localise", chart)
+    detector = eyes.LandingPlaceDetector(eyes.lens(s), streams("detector")) if s.task == "land" else None
+    localiser = eyes.SlamFrontEnd(slam, s.localisation.noise_m, streams("added"))
+    camera = eyes.FisheyeCamera(
+        eyes.renderer(s, place, streams("pixels")), Latency(latency, streams("latency")), s.camera.period_s
+    )
+    front_ends: dict[str, FrontEnd] = {
+        "sonar": eyes.Standing(eyes.SonarToSlam(slam)),
+        "camera": Fresh(eyes.Looking(localiser, detector), s.filter.horizon_s),
+    }
+    return [camera], front_ends
 
 
 def _path(s: QuadrotorScenario) -> AutonomySettings:

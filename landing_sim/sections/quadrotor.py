@@ -87,6 +87,9 @@ class Latency(Section):
 class Eye(Section):
     """The fisheye that looks straight down."""
 
+    width_px: Literal[320, 640] = Field(640, description="pixels across 140 deg; three quarters as many down")
+    noise_dn: NotNegative = Field(2.0, description="one sigma of a pixel's grey level")
+    focal_error: float = Field(0.0, ge=-0.1, le=0.1, description="the true focal length is longer by this share")
     period_s: Positive = Field(0.07, description="between images")
     latency: Latency = Field(Latency(), description="how late they are")
 
@@ -115,10 +118,21 @@ class Sensors(Section):
 class Localisation(Section):
     """Where positions come from."""
 
-    kind: Literal["emulated"] = Field(
-        "emulated", description="the truth made wrong as a visual map's positions are, and as late"
+    kind: Literal["slam", "emulated"] = Field(
+        "slam",
+        description="from rendered images; or the truth made as wrong and as late as those are, a hundred times faster",
     )
-    noise_m: NotNegative = Field(0.004, description="1 sigma of each axis, white")
+    noise_m: NotNegative = Field(
+        0.004, description="1 sigma of each axis, white; slam: added, for its images are too good"
+    )
+    map: str | None = Field(
+        None,
+        max_length=500,
+        description="slam: file of its map, made and written if it is not there; null = made each time",
+    )
+    mapping: bool = Field(False, description="slam: the map grows in flight")
+    fast_threshold: int = Field(8, ge=4, le=100, description="slam: grey levels that a corner must stand out by")
+    window: int = Field(0, ge=0, le=1000, description="slam: keyframes kept; 0 = all")
     wander_m: NotNegative = Field(0.004, description="emulated: 1 sigma of what wanders within 10 s")
     scale_sigma: NotNegative = Field(0.003, description="emulated: 1 sigma of the map's scale")
 
