@@ -5,8 +5,9 @@ inertial unit the heading.
 
 Source     Brockers et al. 2012, section 4.3.
            Departs: every reading counts, not one a keyframe, since readings come in steps of 2.5 cm that only motion evens
-           out; readings far off the fit (over a box) are left out; the ground's plane in the map is levelled, because an
-           attitude that is 0.6 deg off tilts the map by 1 cm a metre. `level_ground` False keeps the inertial unit's level.
+           out; but only where the map shows nothing but ground below, and none that is far off the fit. The ground's plane
+           in the map is levelled, because an attitude that is 0.6 deg off tilts the map by 1 cm a metre; `level_ground`
+           False keeps the inertial unit's level.
 """
 
 from __future__ import annotations
@@ -18,9 +19,20 @@ import numpy as np
 
 from landing_sim.noise import Noise
 from landing_sim.types import Array
+from landing_sim.vision.slam.settings import SlamSettings
 
-MOST_TILT = 0.03  # [rad] a plane steeper than this against the inertial unit's level is not the ground
+MOST_TILT = 0.06  # [rad] a plane steeper than this against the inertial unit's level is not the ground
 TRIES = 200
+BEAM = 0.27  # tangent of 15 deg: what the sonar may hear
+FLAT = 0.012  # [height] a point further off the ground is not of it
+
+
+class Similarity(NamedTuple):
+    """X becomes scale R X + t."""
+
+    scale: float
+    R: Array
+    t: Array
 
 
 class Ground(NamedTuple):
@@ -28,6 +40,39 @@ class Ground(NamedTuple):
 
     n: Array
     on: np.ndarray
+
+
+def similarity(
+    X: Array, anchor: Array, path: Array, readings: Array, settings: SlamSettings, wait: bool
+) -> Similarity | str:
+    """What makes a map level and metric, its ground z = 0; a string says what is still missing.
+
+    Parameters
+    ----------
+    X (m, 3) : points of the map; anchor (3,) : the first camera, whose x and y stay
+    path (n, 3), readings (n,) [m] : where the sonar was in the map, and what it said there
+    wait : for bare ground, if it has not been heard often enough yet
+    """
+    found = ground(X, 0.02 * -float(anchor[2]), settings.seed)
+    turn, down = np.eye(3), 0.0
+    if found is not None:
+        turn = level(found.n) if settings.level_ground else turn
+        X = (X - anchor) @ turn.T + anchor
+        down = float(np.median(X[found.on, 2]))
+        X = X - [0.0, 0.0, down]
+        path = (path - anchor) @ turn.T + anchor - [0.0, 0.0, down]
+    clear = over_ground(path, X)
+    if clear.sum() < settings.scale_readings:
+        if wait:
+            return f"{clear.sum()} sonar readings over bare ground, {settings.scale_readings} needed for the scale"
+        clear[:] = True
+    fitted = sonar_scale(-path[clear, 2], readings[clear], settings.sonar_outlier)
+    if fitted is None:
+        return "too few sonar readings for a scale"
+    k = fitted[0]
+    origin = np.array([anchor[0], anchor[1], 0.0])
+    # first turn @ (X - anchor) + anchor - down, then k (X - origin) + origin
+    return Similarity(k, turn, k * (anchor - turn @ anchor - [0.0, 0.0, down]) + (1.0 - k) * origin)
 
 
 def ground(X: Array, band: float, seed: int) -> Ground | None:
@@ -71,6 +116,15 @@ def level(n: Array) -> Array:
     a = axis / s
     K = np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
     return np.asarray(np.eye(3) + s * K + (1.0 - c) * K @ K)
+
+
+def over_ground(path: Array, X: Array) -> np.ndarray:
+    """(n,) bool: below the places path (n, 3) of the sonar there are points of X (m, 3), and all of them on z = 0."""
+    out = np.zeros(len(path), bool)
+    for i, p in enumerate(path):
+        below = np.hypot(X[:, 0] - p[0], X[:, 1] - p[1]) < BEAM * -p[2]
+        out[i] = below.sum() >= 3 and bool((np.abs(X[below, 2]) < FLAT * -p[2]).all())
+    return out
 
 
 def sonar_scale(heights: Array, readings: Array, outlier: float) -> tuple[float, float] | None:

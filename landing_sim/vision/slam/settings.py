@@ -46,6 +46,7 @@ class SlamSettings:
     parallax: float = 0.0436  # [rad] 2.5 deg between two rays of a new point
     local_frames: int = 5  # free in local bundle adjustment
     scale_frames: int = 10  # keyframes until metric scale and level are frozen
+    scale_readings: int = 30  # of the sonar above bare ground, which are waited for, up to twice as many keyframes
     level_ground: bool = (
         True  # take the ground for level (it is what sonar heights mean), not the inertial unit's vertical
     )

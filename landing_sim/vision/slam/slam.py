@@ -76,6 +76,7 @@ class Slam:
         self.located: Located | None = None  # of the latest image, None if it could not be placed
         self._first: start.Beginning | None = None
         self._failures = 0
+        self._grown = 2  # keyframes made, those that a window has forgotten too
         self._heading: float | None = None  # [rad] to be added to the inertial unit's
         self._last: Pose | None = None
         self._last_t, self._velocity = -math.inf, np.zeros(3)
@@ -229,7 +230,8 @@ class Slam:
         if nearest < s.keyframe_distance * self._height(seen) or len(seen.point) < 0.5 * seen.asked:
             return seen
         k = growth.add_keyframe(self.chart, t, euler, levels, seen, s)
-        if not self.chart.metric and self.chart.frames >= min(s.scale_frames, s.window or s.scale_frames):
+        self._grown += 1
+        if not self.chart.metric and self._grown >= s.scale_frames:
             self._freeze()
         at = np.flatnonzero(self.chart.frame == k)
         point = self.chart.point[at]
@@ -243,30 +245,24 @@ class Slam:
         return float(np.mean(near)) if near else None
 
     def _freeze(self) -> None:
-        """Metric scale, level and heading, once and for all: see `scale`."""
+        """Metric scale, level and heading, once and for all, as soon as enough is known."""
         s, chart = self.settings, self.chart
         growth.adjust_all(chart)
-        anchor = chart.p[0].copy()  # stays where it is, but for its height
         t = np.array([at for at, _ in self._sonar_path])
         path = np.array([p for _, p in self._sonar_path])
-        ground = scale.ground(chart.X, 0.02 * -float(anchor[2]), s.seed)
-        if ground is not None:
-            turn = scale.level(ground.n) if s.level_ground else np.eye(3)
-            chart.move(1.0, turn, anchor - turn @ anchor)
-            down = np.array([0.0, 0.0, np.median(chart.X[ground.on, 2])])
-            chart.move(1.0, np.eye(3), -down)
-            path = (path - anchor) @ turn.T + anchor - down
         said = np.array([(at, height) for at, height in self._sonar if t[0] <= at <= t[-1]]).reshape(-1, 2)
-        fitted = scale.sonar_scale(np.interp(said[:, 0], t, -path[:, 2]), said[:, 1], s.sonar_outlier)
-        if fitted is None:
-            self.reason = "too few sonar readings for a scale"
-            return
-        origin = np.array([*chart.p[0, :2], 0.0])
+        below = np.column_stack([np.interp(said[:, 0], t, path[:, axis]) for axis in range(3)])
         R_RB = np.einsum("kji,jl->kil", chart.R, self.rig.R_CB)
         off = chart.euler[:, 2] - np.arctan2(R_RB[:, 1, 0], R_RB[:, 0, 0])
         heading = float(np.mean(np.arctan2(np.sin(off), np.cos(off))))
+        found = scale.similarity(chart.X, chart.p[0], below, said[:, 1], s, self._grown < 2 * s.scale_frames)
+        if isinstance(found, str):
+            self.reason = found
+            return
+        chart.move(*found)
+        origin = np.array([*chart.p[0, :2], 0.0])
         turn = from_euler(0.0, 0.0, heading)
-        chart.move(fitted[0], turn, origin - fitted[0] * turn @ origin)
-        chart.metric = True
+        chart.move(1.0, turn, origin - turn @ origin)
+        chart.metric, self.reason = True, ""
         self._sonar, self._sonar_path = [], []
         self._last = None  # poses before this are in other units
