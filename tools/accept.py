@@ -101,6 +101,8 @@ GLIDE = (
     Promise("range_30s_percent", "rms", high=2.0),
     Promise("range_60s_percent", "rms", high=0.5),
 )
+ALONE = (Promise("safe", "share", 0.95),)  # without inertial unit: a safe landing or a go-around
+ALONE_LANDS = (*ALONE, Promise("landed", "share", 0.7))
 STILL = ("wind.turbulence=null",)
 ON_GLIDE = ("initial.y_m=0", "initial.height_m=270.4", "initial.heading_deg=0", "observer.outputs=width")
 EFFECTS = {
@@ -136,6 +138,16 @@ CAMPAIGNS: dict[str, Campaign] = {
     "glide_far": Campaign("transport/gibert_far", GLIDE, range(1, 11), (*STILL, *ON_GLIDE)),
     "glide_near": Campaign("transport/gibert_near", GLIDE, range(1, 11), (*STILL, *ON_GLIDE)),
     "transport_4d": Campaign("transport/turbulence", (LANDED,), range(1, 13)),
+    "do128_alone_600": Campaign("do128/inertial_off", ALONE_LANDS, range(1, 31)),
+    "do128_alone_200": Campaign("do128/inertial_off", ALONE_LANDS, range(1, 31), ("faults.0.from_x_m=-200",)),
+    "do128_alone_flare": Campaign(
+        "do128/inertial_off", ALONE, range(1, 31), ("faults=[{sensor: inertial, kind: off, below_height_m: 10}]",)
+    ),
+    "transport_alone_600": Campaign("transport/inertial_off", ALONE_LANDS, range(1, 31)),
+    "transport_alone_200": Campaign("transport/inertial_off", ALONE_LANDS, range(1, 31), ("faults.0.from_x_m=-200",)),
+    "transport_alone_flare": Campaign(
+        "transport/inertial_off", ALONE, range(1, 31), ("faults=[{sensor: inertial, kind: off, below_height_m: 12}]",)
+    ),
     "do128_unknown": Campaign("do128/gibert", UNKNOWN[:6], range(1, 31)),
 }  # fmt: skip
 
@@ -151,6 +163,7 @@ def fly(job: tuple[str, tuple[str, ...], int]) -> dict[str, float]:
     metrics = dict(flight.verdict.metrics)
     metrics["landed"] = float(flight.verdict.outcome == "landed")
     log = flight.log
+    metrics |= backup(log, flight.verdict.outcome, metrics)
     found = judge.consistency(log)
     metrics |= {f"nees_{name}": found[name] for name in STATES if name in found}
     if "est_W_m" in log:
@@ -160,6 +173,21 @@ def fly(job: tuple[str, tuple[str, ...], int]) -> dict[str, float]:
         metrics["width_at_loss_m"] = float(abs(error[seen][-1]))
         metrics["width_mean_m"] = float(abs(np.mean(error[far])))
     return metrics | ranging(log)
+
+
+def backup(log: Any, outcome: str, metrics: dict[str, float]) -> dict[str, float]:
+    """Whether it ended safely; rms errors in the air from the death of the inertial unit on, 0 where it lived."""
+    inside = 250.0 <= metrics["touchdown_x_m"] <= 900.0 and abs(metrics["touchdown_y_m"]) <= 5.0
+    safe = outcome == "go_around" or (outcome == "landed" and inside and metrics["sink_rate_mps"] <= 2.0)
+    found = {"safe": float(safe)}
+    if "flag_inertial" not in log:
+        return found
+    end = math.inf if log.touchdown is None else log.touchdown.t
+    dead = ~log["flag_inertial"] & log["valid"] & (log["t_s"] < end)
+    for name, unit, factor in (("q", "dps", 57.2957795), ("theta", "deg", 57.2957795), ("H", "m", 1.0)):
+        error = factor * log.error(name)[dead]
+        found[f"alone_{name}_{unit}"] = float(np.sqrt(np.mean(error**2))) if len(error) else 0.0
+    return found
 
 
 def ranging(log: Any) -> dict[str, float]:
