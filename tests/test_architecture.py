@@ -33,7 +33,7 @@ ALLOWED_OURS = {
 }
 ONLY_IN = {
     "jsbsim": {"plants/jsbsim.py", "plants/jsbsim_lander.py", "plants/jsbsim_quadrotor.py"},
-    "rerun": {"record/replay.py", "record/stage.py", "record/lunar_replay.py"},
+    "rerun": {"record/replay.py", "record/stage.py", "record/lunar_replay.py", "record/quadrotor_replay.py"},
 }
 
 

@@ -59,11 +59,18 @@ def fly(
     except (PlantError, ValueError) as error:
         raise ScenarioError([Problem(Mark(scenario.name), (), f"cannot be flown: {error}")]) from error
     builder, told = log.LogBuilder(), []
+    camera = None
+    if recording is not None:
+        from landing_sim.missions.quadrotor_pictures import Pictures
+
+        camera = Pictures(recording, scenario, mission, live)
     for step in mission.steps():
         builder.add(step)
         told.append(_told(step))
         if watch is not None:
             watch(step)
+        if camera is not None:
+            camera.add(step)
     outcome = mission.outcome()
     flown = builder.finish(
         scenario=scenario.model_dump(mode="json"),
@@ -73,6 +80,8 @@ def fly(
         extra={"reason": outcome.reason} if outcome.reason else None,
     )
     _add(flown, np.array(told))
+    if camera is not None:
+        camera.close(flown)
     return runner.Flight(flown, verdict(flown, scenario, mission), time.perf_counter() - started)
 
 
