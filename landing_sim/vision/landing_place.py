@@ -23,7 +23,16 @@ from landing_sim.noise import NoiseStream
 from landing_sim.types import Array
 from landing_sim.vision.landing_place_planes import Plane, aligned, aligned_along, homography, misalignment, plane_of
 from landing_sim.vision.landing_place_pool import Limits, Pool, Refusal, WayPoint, outside
-from landing_sim.vision.landing_place_top import Rectangle, foreign, in_view, least_round, patches, rectangle
+from landing_sim.vision.landing_place_top import (
+    Rectangle,
+    foreign,
+    gaps,
+    halfway,
+    in_view,
+    on_level,
+    patches,
+    rectangle,
+)
 from landing_sim.vision.landing_place_views import Pair, View, Views
 
 
@@ -37,9 +46,9 @@ class DetectorSettings:
     tries : random samples a plane; planes : looked for besides the ground
     level : how far the ground may seem tilted
     link : a wider gap splits what lies on one plane
-    border, edge : no rectangle nearer to the image's edge than border [px] and edge [rad] together
+    border : [px] the image's edge that no feature is looked for in
     shrink : of the rectangle within which no more than `foreign` features, or that share of its own, may be off its plane
-    ring : ground must be seen within this distance beside each side, `beside` features or more
+    ring : within it, the nth nearest ground feature beside each side of the rectangle must have been seen
     doubt : share by which one way point may break the limits of a pool's mean
     same, same_height : a patch whose middle and height are that near to a pool's belongs to it
     """
@@ -55,13 +64,12 @@ class DetectorSettings:
     planes: int = 4
     level: float = math.radians(6.0)
     link: float = 0.22
-    border: float = 12.0
-    edge: float = math.radians(4.0)
+    border: float = 8.0
     shrink: float = 0.04
     foreign: int = 2
     foreign_share: float = 0.12
-    ring: float = 0.30
-    beside: int = 2
+    ring: float = 0.25
+    nth: int = 3
     doubt: float = 0.4
     same: float = 0.35
     same_height: float = 0.04
@@ -194,11 +202,20 @@ class LandingPlaceDetector:
         pool.collect(pair.ids[at], X)
         known = pool.known(2)
         top = rectangle(known if len(known) >= s.enough else X)
+        for view, rays in ((pair.first, pair.a), (pair.second, pair.b)):
+            seen = on_level(rays[ground.members], view.p, top.z)
+            pool.around.append(seen[np.max(abs(seen - top.centre), axis=1) < s.limits.largest])
+        gap = gaps(top, np.concatenate(pool.around), s.nth)
+        whole = bool((gap < s.ring).all())
+        if whole:
+            top = halfway(top, gap)
         longer, shorter = sorted((2.0 * top.half).tolist(), reverse=True)
         point = WayPoint(
             pair.second.t, np.array([*top.centre, top.z]), height, (longer, shorter), plane.normal, len(known)
         )
-        refusal = Refusal.TOO_FEW if len(known) < s.enough else self._refusal(pair, ground, plane, top, point)
+        refusal = Refusal.TOO_FEW if len(known) < s.enough else self._refusal(pair, pool, plane, top, point)
+        if refusal is None and not whole:
+            refusal = Refusal.NOT_SURROUNDED
         if refusal is None:
             pool.add(point)
         return Candidate(point, refusal)
@@ -213,15 +230,14 @@ class LandingPlaceDetector:
         self.pools.append(Pool(height))
         return self.pools[-1]
 
-    def _refusal(self, pair: Pair, ground: Plane, plane: Plane, top: Rectangle, point: WayPoint) -> Refusal | None:
-        """Why one way point is not pooled: limits that noise cannot explain, what is on it, what was not seen of it."""
+    def _refusal(self, pair: Pair, pool: Pool, plane: Plane, top: Rectangle, point: WayPoint) -> Refusal | None:
+        """Why one way point is not pooled: limits that noise cannot explain, what is out of view or on it."""
         s = self.settings
         unfit = outside(point.height, *point.size, plane.tilt, s.limits.widened(s.doubt))
         if unfit is not None:
             return unfit
-        margin = s.border + s.edge * self.lens.focal
-        if not all(in_view(top, view, self.lens, margin) for view in (pair.first, pair.second)):
+        pool.whole |= in_view(top, pair.second, self.lens, s.border)
+        if not pool.whole:
             return Refusal.NOT_IN_VIEW
-        if foreign(top, pair, plane.members, s.shrink) > max(s.foreign, s.foreign_share * point.features):
-            return Refusal.CLUTTER
-        return Refusal.NOT_IN_VIEW if least_round(top, pair, ground.members, s.ring) < s.beside else None
+        over = foreign(top, pair, plane.members, s.shrink) > max(s.foreign, s.foreign_share * point.features)
+        return Refusal.CLUTTER if over else None

@@ -11,6 +11,8 @@ import numpy as np
 
 from landing_sim.types import Array
 
+LOOKS = 60  # whose ground is remembered
+
 
 class Refusal(StrEnum):
     """Why there is no landing place, or not here."""
@@ -26,7 +28,8 @@ class Refusal(StrEnum):
     TOO_LARGE = "too large"
     TILTED = "tilted"
     CLUTTER = "something on it, or the ground seen through it"
-    NOT_IN_VIEW = "not wholly in view"
+    NOT_IN_VIEW = "never yet wholly in view"
+    NOT_SURROUNDED = "no ground seen beside one of its sides: it may go on there"
     TOO_NEW = "not seen often enough"
     UNSTEADY = "its place varies too much"
 
@@ -70,7 +73,7 @@ class Limits:
 
 @dataclass
 class Pool:
-    """The way points of one place, the latest `keep`, and the features that were found to lie on it.
+    """The way points of one place, the latest `keep`; the features that were found to lie on it; where it is not.
 
     level [m] : height above the ground at which it was first seen
     """
@@ -79,6 +82,10 @@ class Pool:
     keep: int = 16
     points: deque[WayPoint] = field(default_factory=deque)
     seen: dict[int, tuple[int, Array]] = field(default_factory=dict)  # id: how often, sum of places (3,) [m]
+    whole: bool = False  # all of it has been in view at once
+    around: deque[Array] = field(
+        default_factory=lambda: deque(maxlen=LOOKS)
+    )  # (n, 2) [m] where ground was seen past it
 
     def collect(self, ids: np.ndarray, X: Array) -> None:
         """Features ids (n,) lie on it, at X (n, 3) [m]."""

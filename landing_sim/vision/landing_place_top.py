@@ -11,6 +11,8 @@ from landing_sim.geometry.fisheye import Fisheye
 from landing_sim.types import Array
 from landing_sim.vision.landing_place_views import Pair, View
 
+BESIDE = 0.8  # of a side's length counts as beside it: a rectangle is a little askew
+
 
 @dataclass(frozen=True, slots=True)
 class Rectangle:
@@ -71,13 +73,24 @@ def foreign(top: Rectangle, pair: Pair, members: np.ndarray, shrink: float) -> i
     return int(((abs(own) < top.half - shrink).all(axis=1) & ~members).sum())
 
 
-def least_round(top: Rectangle, pair: Pair, ground: np.ndarray, reach: float) -> int:
-    """Ground features seen beside each side of the rectangle, within `reach` [m]: the number at the barest side."""
-    own = top.own(on_level(pair.b[ground], pair.second.p, top.z))
-    counts = []
+def gaps(top: Rectangle, ground: Array, nth: int) -> Array:
+    """(2, 2) [m] from the rectangle's sides, - and + along each of its axes, to the nth nearest of `ground` beside it.
+
+    ground (n, 2) [m] : where ground was seen, on the rectangle's level; inf where fewer than nth are beside a side
+    """
+    own = top.own(ground)
+    out = np.full((2, 2), np.inf)
     for axis in (0, 1):
-        beside = abs(own[:, 1 - axis]) < top.half[1 - axis] + 0.5 * reach
-        for sign in (-1.0, 1.0):
-            out = sign * own[:, axis] - top.half[axis]
-            counts.append(int((beside & (out > 0.0) & (out < reach)).sum()))
-    return min(counts)
+        beside = own[abs(own[:, 1 - axis]) < BESIDE * top.half[1 - axis], axis]
+        for k, sign in enumerate((-1.0, 1.0)):
+            gap = sign * beside - top.half[axis]
+            gap = gap[gap > 0.0]
+            if len(gap) >= nth:
+                out[axis, k] = np.partition(gap, nth - 1)[nth - 1]
+    return out
+
+
+def halfway(top: Rectangle, gap: Array) -> Rectangle:
+    """The rectangle with each side moved outwards by half its gap (2, 2) [m]."""
+    shift = 0.25 * (gap[:, 1] - gap[:, 0])
+    return Rectangle(top.centre + shift @ top.u, top.half + 0.25 * gap.sum(axis=1), top.u, top.z)
