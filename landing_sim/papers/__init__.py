@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from landing_sim.papers.paper import Paper
 
-PAPERS = ("dickmanns-1992", "gibert-2015", "sabiron-2014")
+PAPERS = ("dickmanns-1992", "gibert-2015", "sabiron-2014", "brockers-2012")
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +43,12 @@ def load(name: str) -> Paper:
 
         text = (sabiron.NAME, sabiron.TITLE, sabiron.LEAD, sabiron.FIGURES, "Simulations", sabiron.RUNS)
         return Paper(*text, sabiron.CLAIMS, sabiron.perform, sabiron_figures.figures)
+    if name == "brockers-2012":
+        from landing_sim.papers import brockers_2012 as brockers
+        from landing_sim.papers import brockers_figures
+
+        text = (brockers.NAME, brockers.TITLE, brockers.LEAD, brockers.FIGURES, "Flights", brockers.RUNS)
+        return Paper(*text, brockers.CLAIMS, brockers.perform, brockers_figures.figures)
     raise KeyError(f"no such paper: {name!r}; there are: {', '.join(PAPERS)}")
 
 
