@@ -40,4 +40,4 @@ event.register("numba:compile", _Uncollected())
 
 def kernel(function: F) -> F:
     """Compile `function` with numba, cached on disk."""
-    return numba.njit(cache=True, fastmath=False, error_model="numpy")(function)  # type: ignore[no-any-return]
+    return numba.njit(cache=True, fastmath=False, error_model="numpy", no_cfunc_wrapper=True)(function)  # type: ignore[no-any-return]

@@ -16,7 +16,7 @@ import numpy as np
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.sensors import render_cv2
 from landing_sim.sensors.render_kernels import TILE, edge_table, project
-from landing_sim.sensors.render_noise import develop_frame, develop_materials, developed, gaussian_quantiles
+from landing_sim.sensors.render_noise import develop_frame, developed, gaussian_quantiles
 from landing_sim.sensors.render_windows import shade_windows
 from landing_sim.signals import CameraTruth
 from landing_sim.types import Array
@@ -24,7 +24,6 @@ from landing_sim.world.runway import GRASS, SKY, Runway
 
 RENDERERS = ("exact", "line_aa", "line_8")
 SUB_EXPOSURES = 4  # instants averaged into one frame when the shutter is not instantaneous
-NOTHING = np.empty((0, 0), np.uint8)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +65,7 @@ class Renderer:
 
     __slots__ = (
         "camera",
+        "greys",
         "intrinsics",
         "key",
         "lens",
@@ -88,9 +88,10 @@ class Renderer:
         self.camera = np.array([c.f, c.cx, c.cy, c.width, c.height, optics.blur])
         self.lens = np.array([optics.gain, optics.offset, optics.noise])
         self.key = np.uint64(key)
-        columns, rows = np.meshgrid(np.arange(0, c.width, TILE), np.arange(0, c.height, TILE))
+        columns, rows = np.meshgrid(np.arange(0, c.width, TILE[0]), np.arange(0, c.height, TILE[1]))
         self.tiles = np.column_stack([columns.ravel(), rows.ravel()]).astype(np.int64)
         self.table, self.quantiles = _edge_table(), gaussian_quantiles()
+        self.greys = developed(tuple(self.palette.tolist()), optics.gain, optics.offset, optics.noise)
 
     def frame(
         self, p_RC: Array, R_CR: Array, index: int, v_RC_R: Array | None = None, w_RC_C: Array | None = None
@@ -137,7 +138,7 @@ class RenderedFrame:
         n = len(corners)
         if self.renderer.optics.renderer == "exact":
             flat = np.empty((n * height, width), np.uint8)
-            inside = self._shade(flat, corners, width, height, NOTHING, looked)
+            inside = self._shade(flat, corners, width, height, looked)
             out = flat.reshape(n, height, width)
         else:
             image = np.lib.stride_tricks.sliding_window_view(self.full(), (height, width))
@@ -158,28 +159,24 @@ class RenderedFrame:
 
     def _full(self) -> np.ndarray:
         r = self.renderer
+        if r.optics.renderer == "exact":
+            out = np.empty((self.height, self.width), np.uint8)
+            self._shade(out, r.tiles, *TILE, whole=True)
+            return out
         lines, seen, counts, horizon = self._project()
-        count = int(counts[0])
-        exact = r.optics.renderer == "exact"
-        # Exact frames are painted with material numbers and looked up in the palette, the others with grey levels.
-        colours = np.arange(len(r.palette)) if exact else np.rint(r.palette).astype(np.int64)
-        image = np.full((self.height, self.width), colours[SKY], dtype=np.uint8)
+        count, greys = int(counts[0]), np.rint(r.palette).astype(np.int64)
+        image = np.full((self.height, self.width), greys[SKY], dtype=np.uint8)
         render_cv2.paint(
             image,
             lines[0],
             count,
-            colours[seen[0, :count, 0]],
-            int(colours[GRASS]),
+            greys[seen[0, :count, 0]],
+            int(greys[GRASS]),
             horizon[0],
             self.poses[0][1],
             r.camera,
             antialias=r.optics.renderer == "line_aa",
         )
-        if exact:
-            out = np.empty_like(image)
-            develop_materials(out, image, developed(tuple(r.palette.tolist()), *r.lens.tolist()), r.key, self.index)
-            self._shade(out, r.tiles, TILE, TILE, image, None)
-            return out
         blurred = render_cv2.blur(image, r.optics.blur)
         return develop_frame(blurred, r.lens, r.quantiles, r.key, self.index)  # type: ignore[no-any-return]
 
@@ -189,16 +186,16 @@ class RenderedFrame:
         corners: np.ndarray,
         width: int,
         height: int,
-        filled: np.ndarray,
-        looked: np.ndarray | None,
+        looked: np.ndarray | None = None,
+        whole: bool = False,
     ) -> bool:
         r = self.renderer
         scene = self._project()
         if looked is None:
             looked = np.empty((0, 4), dtype=np.int64)
         return shade_windows(  # type: ignore[no-any-return]
-            out, corners, width, height, looked, filled, *scene, r.camera, r.palette, r.lens, r.table, r.quantiles, r.key,
-            self.index,
+            out, corners, width, height, looked, whole, *scene, r.camera, r.palette, r.lens, r.table, r.quantiles, r.greys,
+            r.key, self.index,
         )  # fmt: skip
 
     def _project(self) -> tuple[Array, np.ndarray, np.ndarray, Array]:

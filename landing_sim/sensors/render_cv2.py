@@ -1,8 +1,7 @@
-"""OpenCV's share of the picture: polygon interiors, and whole frames drawn by its own edges as a control.
+"""Whole frames drawn by OpenCV, as a control.
 
 cv2.fillConvexPoly also draws the outline of what it fills, so edges move outwards by about 0.5 px (LINE_8) or 0.7 px
-(LINE_AA): tens of metres of range for a camera on the glide path. Interiors, a few pixels inside, are right: the exact
-renderer takes only those. Frames drawn entirely by OpenCV exist to show what the bias does.
+(LINE_AA): tens of metres of range for a camera on the glide path. These frames exist to show what the bias does.
 """
 
 from __future__ import annotations

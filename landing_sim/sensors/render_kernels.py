@@ -24,14 +24,14 @@ import numpy as np
 
 from landing_sim.geometry.runway_image import horizon_dip
 from landing_sim.jit import kernel
-from landing_sim.sensors.render_noise import develop, stream_of
+from landing_sim.sensors.render_noise import develop, develop_flat, stream_of
 from landing_sim.types import Array
 
 CUT = 4.0  # [sigma] half width of an edge's profile
 TABLE_HALF = 512
 TABLE_SIZE = 2 * TABLE_HALF
 SLACK = 1e-6  # table units: covers rounding when a whole block is classified at once
-TILE = 32  # [px] side of the blocks a full frame is made of
+TILE = 64, 32  # [px] width and height of the blocks that a full frame is made of
 FAR = 1 << 20  # [px] outside every image
 CULL_MARGIN = 64.0  # [px] around the image outside which a quadrilateral is dropped
 
@@ -299,22 +299,21 @@ def _draw_quad(
 
 @kernel
 def shade(
-    out: np.ndarray, corners: np.ndarray, w: int, h: int, looked: np.ndarray, filled: np.ndarray,
+    out: np.ndarray, corners: np.ndarray, w: int, h: int, looked: np.ndarray, whole: bool,
     lines: Array, seen: np.ndarray, counts: np.ndarray, horizon: Array, camera: Array, palette: Array, lens: Array,
-    table: Array, quantiles: np.ndarray, key: np.uint64, index: int,
+    table: Array, quantiles: np.ndarray, greys: np.ndarray, key: np.uint64, index: int,
 ) -> bool:  # fmt: skip
     """Blocks of w x h pixels with their top-left pixels at corners (n, 2) [u0, v0], as uint8.
 
-    filled empty: `out` (n h, w) takes the blocks one below the other; False, and nothing done, if one leaves the frame.
+    whole: `out` is the frame (height, width), and each block goes to its place, less what sticks out of the frame.
+    Otherwise `out` (n h, w) takes the blocks one below the other; False, and nothing done, if one leaves the frame.
     looked (n, 4), if not empty: first and behind the last column and row of each block that are made, and no others.
-    filled (height, width) uint8, materials painted beforehand: `out` is the frame that `develop_materials` made of them,
-    each block goes to its place (less what sticks out of the frame), and blocks without an edge stay as they are.
+    greys: the palette as `developed`, for blocks without an edge.
 
     A frame is the mean over its sub-exposures (first axis of lines, seen, counts, horizon), then lens and noise.
     """
     width, height = int(camera[3]), int(camera[4])
-    stacked = filled.size == 0
-    if stacked:
+    if not whole:
         for i in range(corners.shape[0]):
             u0, v0 = corners[i, 0], corners[i, 1]
             if u0 < 0 or v0 < 0 or u0 + w > width or v0 + h > height:
@@ -322,22 +321,23 @@ def shade(
     subs = counts.shape[0]
     active, edges = np.empty(seen.shape[:2], np.int64), np.empty(seen.shape[:2], np.int64)
     base, first = np.empty(subs, np.int64), np.empty(subs, np.int64)
-    block, total, noise = np.empty((h, w)), np.empty((h, w)), np.empty(w + 6)
+    block, total, noise, hashes = np.empty((h, w)), np.empty((h, w)), np.empty(w + 6), np.empty((w + 6) >> 2, np.uint64)
     stream = stream_of(key, index)
     for i in range(corners.shape[0]):
         u0, v0 = corners[i, 0], corners[i, 1]
-        r0, c0 = (i * h, 0) if stacked else (v0, u0)
+        r0, c0 = (v0, u0) if whole else (i * h, 0)
         bw, bh = min(w, width - u0), min(h, height - v0)
         if len(looked) > 0:
             bw, bh = looked[i, 2] - looked[i, 0], looked[i, 3] - looked[i, 1]
             u0, c0, v0, r0 = u0 + looked[i, 0], c0 + looked[i, 0], v0 + looked[i, 1], r0 + looked[i, 1]
-        flat = not stacked
+        flat = True
         for k in range(subs):
             base[k], first[k] = _classify(
                 u0, v0, bw, bh, lines[k], seen[k], counts[k], horizon[k], camera, active[k], edges[k]
             )
-            flat = flat and base[k] >= 0 and first[k] == counts[k]
+            flat = flat and base[k] >= 0 and base[k] == base[0] and first[k] == counts[k]
         if flat:
+            develop_flat(out, r0, c0, greys[base[0]], bw, bh, u0, v0, stream, hashes)
             continue
         for k in range(subs):
             if base[k] < 0:

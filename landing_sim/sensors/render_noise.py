@@ -22,7 +22,7 @@ def gaussian_quantiles() -> np.ndarray:
 
 @lru_cache(maxsize=4)
 def developed(palette: tuple[float, ...], gain: float, offset: float, sigma: float) -> np.ndarray:
-    """(n, 65536) uint8: what `develop` makes of each of n greys with each of the quantiles."""
+    """(n, 65536) uint8: what `develop` makes of each of n greys with each of the quantiles; read by `develop_flat`."""
     value = (np.array(palette) * gain + offset)[:, None] + sigma * gaussian_quantiles().astype(np.float64) + 0.5
     return np.clip(value, 0.0, 255.0).astype(np.uint8)
 
@@ -70,17 +70,23 @@ def develop(
 
 
 @kernel
-def develop_materials(out: np.ndarray, materials: np.ndarray, greys: np.ndarray, key: np.uint64, index: int) -> None:
-    """A frame (height, width) uint8 of the materials painted in it, as if there were no edges; greys as `developed`."""
-    height, width = out.shape
-    stream = stream_of(key, index)
-    hashes = np.empty((width + 3) >> 2, np.uint64)
+def develop_flat(
+    out: np.ndarray, r0: int, c0: int, grey: np.ndarray, w: int, h: int, u0: int, v0: int, stream: np.uint64,
+    hashes: np.ndarray,
+) -> None:  # fmt: skip
+    """`develop` of a block of one grey, given as its row (65536,) of `developed`.
+
+    hashes (>= (w + 6) / 4,) uint64 is working space.
+    """
     bits = hashes.view(np.uint16)  # the lanes of `develop`, on a little-endian machine
-    for r in range(height):
-        for g in range(len(hashes)):
-            hashes[g] = mix(stream + np.uint64((r << 20) + g + 1) * np.uint64(0x9E3779B97F4A7C15))
-        for c in range(width):
-            out[r, c] = greys[materials[r, c], bits[c]]
+    skip = u0 & 3
+    for r in range(h):
+        counter = stream + np.uint64(((v0 + r) << 20) + (u0 >> 2) + 1) * np.uint64(0x9E3779B97F4A7C15)
+        for g in range((skip + w + 3) >> 2):
+            hashes[g] = mix(counter)
+            counter += np.uint64(0x9E3779B97F4A7C15)
+        for c in range(w):
+            out[r0 + r, c0 + c] = grey[bits[skip + c]]
 
 
 @kernel

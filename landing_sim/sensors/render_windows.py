@@ -51,9 +51,9 @@ def merged(corners: np.ndarray, looked: np.ndarray, boxes: np.ndarray, member: n
 
 @kernel
 def shade_windows(
-    out: np.ndarray, corners: np.ndarray, w: int, h: int, looked: np.ndarray, filled: np.ndarray,
+    out: np.ndarray, corners: np.ndarray, w: int, h: int, looked: np.ndarray, whole: bool,
     lines: Array, seen: np.ndarray, counts: np.ndarray, horizon: Array, camera: Array, palette: Array, lens: Array,
-    table: Array, quantiles: np.ndarray, key: np.uint64, index: int,
+    table: Array, quantiles: np.ndarray, greys: np.ndarray, key: np.uint64, index: int,
 ) -> bool:  # fmt: skip
     """`shade`, what windows share of their `looked` shaded once: the same pixels."""
     n = m = len(corners)
@@ -65,8 +65,8 @@ def shade_windows(
         m = merged(corners, looked, boxes, member)
     if m == n:
         return shade(
-            out, corners, w, h, looked, filled, lines, seen, counts, horizon, camera, palette, lens, table, quantiles,
-            key, index,
+            out, corners, w, h, looked, whole, lines, seen, counts, horizon, camera, palette, lens, table, quantiles,
+            greys, key, index,
         )  # fmt: skip
     tops, parts = np.empty((m, 2), np.int64), np.zeros((m, 4), np.int64)
     size = np.zeros(2, np.int64)  # an array, since `shade` would be compiled once more for the constant 0
@@ -82,8 +82,8 @@ def shade_windows(
             parts[k, 2 + c] += parts[k, c]
     made = np.empty((m * size[1], size[0]), np.uint8)
     shade(
-        made, tops, size[0], size[1], parts, filled, lines, seen, counts, horizon, camera, palette, lens, table, quantiles,
-        key, index,
+        made, tops, size[0], size[1], parts, whole, lines, seen, counts, horizon, camera, palette, lens, table, quantiles,
+        greys, key, index,
     )  # fmt: skip
     for i in range(n):
         k = member[i]
