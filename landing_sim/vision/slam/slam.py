@@ -76,6 +76,7 @@ class Slam:
         self.located: Located | None = None  # of the latest image, None if it could not be placed
         self._first: start.Beginning | None = None
         self._failures = 0
+        self._anchor = np.zeros(3)  # place of the first keyframe, which a window forgets
         self._grown = 2  # keyframes made, those that a window has forgotten too
         self._heading: float | None = None  # [rad] to be added to the inertial unit's
         self._last: Pose | None = None
@@ -153,7 +154,7 @@ class Slam:
         if self.reason:
             self._first = None
             return None
-        self._first = None
+        self._first, self._anchor = None, self.chart.p[0].copy()
         self.status = "tracking"
         return track(self.chart, levels, self.chart.pose(1), self.settings, self.settings.fine_points)
 
@@ -255,12 +256,12 @@ class Slam:
         R_RB = np.einsum("kji,jl->kil", chart.R, self.rig.R_CB)
         off = chart.euler[:, 2] - np.arctan2(R_RB[:, 1, 0], R_RB[:, 0, 0])
         heading = float(np.mean(np.arctan2(np.sin(off), np.cos(off))))
-        found = scale.similarity(chart.X, chart.p[0], below, said[:, 1], s, self._grown < 2 * s.scale_frames)
+        found = scale.similarity(chart.X, self._anchor, below, said[:, 1], s, self._grown < 2 * s.scale_frames)
         if isinstance(found, str):
             self.reason = found
             return
         chart.move(*found)
-        origin = np.array([*chart.p[0, :2], 0.0])
+        origin = np.array([*self._anchor[:2], 0.0])
         turn = from_euler(0.0, 0.0, heading)
         chart.move(1.0, turn, origin - turn @ origin)
         chart.metric, self.reason = True, ""
