@@ -507,8 +507,7 @@ def test_lands_in_a_crosswind() -> None:
 
 @pytest.mark.slow
 def test_lands_in_light_turbulence() -> None:
-    """Six seeds: safe each, on the spot and softly as a rule. Seed 5 floats to 830 m, one of the few in a hundred that do:
-    the price of holding off where gusts would otherwise make for hard landings (seed 1 still is one)."""
+    """Six seeds: soft each, five on the spot. Seed 5 gains 5 m/s of headwind in its flare and floats to 690 m."""
     touches = []
     for seed in range(1, 7):
         flight = fly("transport/turbulence", seed=seed)
@@ -516,9 +515,9 @@ def test_lands_in_light_turbulence() -> None:
         touches.append(flight.log.touchdown)
     x, y, sinks, banks = np.array([(t.x, t.y, t.sink_rate, t.bank) for t in touches]).T
     assert x.min() > 200.0
-    assert x.max() < 915.0
+    assert x.max() < 750.0
     assert np.sum(np.abs(x - 400.0) < 150.0) >= 5
     assert np.abs(y).max() < 3.0
     assert np.degrees(np.abs(banks)).max() < 3.0
-    assert sinks.max() < 2.5
-    assert np.median(sinks) < 1.2
+    assert sinks.max() < 1.5
+    assert np.median(sinks) < 1.0
