@@ -14,7 +14,7 @@ Source     Brockers et al. 2012, section 3.4.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -44,6 +44,7 @@ class DetectorSettings:
     shared : features that a pair must have in common; least : of them on a plane; enough : on a place, each found twice
     tolerance : between where a feature is and where its plane puts it
     tries : random samples a plane; planes : looked for besides the ground
+    ground_share : the ground is the lowest plane with that share of the features of the one with the most
     level : how far the ground may seem tilted
     link : a wider gap splits what lies on one plane
     border : [px] the image's edge that no feature is looked for in
@@ -62,6 +63,7 @@ class DetectorSettings:
     tolerance: float = 0.006
     tries: int = 128
     planes: int = 4
+    ground_share: float = 0.25
     level: float = math.radians(6.0)
     link: float = 0.22
     border: float = 8.0
@@ -89,7 +91,7 @@ class Look:
     """What one look brought.
 
     candidates : patches above the ground, largest first; refusal : why there are none
-    place : the mean way point of the best pool that has settled; None while none has
+    place : the mean way point of a pool that has settled, the same as before while it is settled; None while none is
     pools : of each place seen, the middle (3,) [m] of its features and why it is no landing place, None if it is one
     """
 
@@ -114,6 +116,7 @@ class LandingPlaceDetector:
         self.settings = settings or DetectorSettings()
         self._views = Views(self.settings.age)
         self.pools: list[Pool] = []
+        self._chosen: Pool | None = None  # once a place is found, it is that one as long as it is fit
 
     def look(self, t: float, ids: np.ndarray, rays_C: Array, p_RC: Array, R_CR: Array) -> Look:
         """The features of a frame taken at t [s] from p_RC (3,) [m] with the attitude R_CR (3, 3), metric.
@@ -136,18 +139,19 @@ class LandingPlaceDetector:
     def _look(self, t: float, candidates: tuple[Candidate, ...], refusal: Refusal | None) -> Look:
         pools = tuple((pool.middle, pool.refusal(self.settings.limits)) for pool in self.pools)
         settled = [pool for pool, (_, why) in zip(self.pools, pools) if why is None]
-        place = None
-        if settled:
-            pool = max(settled, key=lambda pool: len(pool.points))
-            place = replace(pool.points[-1], p_R=pool.mean, height=pool.height)
-        return Look(t, candidates, refusal, place, pools)
+        if self._chosen not in settled:
+            self._chosen = max(settled, key=lambda pool: len(pool.points)) if settled else None
+        return Look(t, candidates, refusal, self._chosen.summary() if self._chosen else None, pools)
 
     def _candidates(self, pair: Pair) -> tuple[tuple[Candidate, ...], Refusal | None]:
+        s = self.settings
         planes = self._planes(pair)
         if not planes:
             return (), Refusal.NO_GROUND
-        ground = max(planes, key=lambda plane: plane.distance)
-        if ground.tilt > self.settings.level:
+        most = max(int(plane.members.sum()) for plane in planes)
+        wide = [plane for plane in planes if plane.members.sum() >= s.ground_share * most]
+        ground = max(wide, key=lambda plane: plane.distance)
+        if ground.tilt > s.level:
             return (), Refusal.GROUND_TILTED
         found = [c for plane in planes if plane is not ground for c in self._tops(pair, ground, plane)]
         found.sort(key=lambda c: -c.point.features)

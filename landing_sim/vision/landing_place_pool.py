@@ -71,7 +71,7 @@ class Limits:
         )  # fmt: skip
 
 
-@dataclass
+@dataclass(eq=False)
 class Pool:
     """The way points of one place, the latest `keep`; the features that were found to lie on it; where it is not.
 
@@ -122,6 +122,10 @@ class Pool:
     def height(self) -> float:
         """[m] mean over the ground."""
         return float(np.mean([q.height for q in self.points]))
+
+    def summary(self) -> WayPoint:
+        """The mean way point, at the time of the latest."""
+        return replace(self.points[-1], p_R=self.mean, height=self.height)
 
     def refusal(self, limits: Limits) -> Refusal | None:
         """Why the place is not fit to land on, or not yet; None if it is."""
