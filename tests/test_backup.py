@@ -264,8 +264,8 @@ def test_a_sample_too_old_is_left_alone() -> None:
 # ------------------------------------------------------------------------------------------------------- the filter
 
 
-def backup(factorisation: str = "dense") -> BackupEkf:
-    config = FilterConfig(factorisation=factorisation)  # type: ignore[arg-type]
+def backup(factorisation: str = "dense", kind: str = "augmented") -> BackupEkf:
+    config = FilterConfig(kind=kind, factorisation=factorisation)  # type: ignore[arg-type]
     alone = replace(config, q_rates=tuple(2.0 * q for q in config.q_rates))
     return BackupEkf(bench.filter_of(config), bench.filter_of(alone), 0.21)
 
@@ -357,6 +357,17 @@ def test_a_flow_that_cannot_be_is_not_believed() -> None:
     assert after.flow > 10.0
     near = ekf.update(memory, replace(wild, z=np.array([0.3, true + 0.002])))
     assert (near.inner.x != memory.inner.x).any()
+
+
+@pytest.mark.parametrize("kind", ["plain", "split", "augmented"])
+def test_every_filter_takes_flows(kind: str) -> None:
+    ekf = backup(kind=kind)
+    _, out, memory = flown(ekf, 12)
+    flow = aircraft_flow(memory.inner.x, 0.3, np.empty(states.N)) + 0.001
+    after = ekf.update(memory, Measurement("flow", 0.7, 0.7, np.array([0.3, flow]), np.array([0.0, 0.001**2])))
+    q = out[-1].names.index("q")
+    assert ekf.read(after).cov[q, q] < 0.9 * ekf.read(memory).cov[q, q]  # type: ignore[index]
+    assert ekf.read(after)["q"] > ekf.read(memory)["q"]
 
 
 def test_two_filters_that_do_not_fit_are_refused() -> None:
