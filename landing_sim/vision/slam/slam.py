@@ -253,17 +253,16 @@ class Slam:
         path = np.array([p for _, p in self._sonar_path])
         said = np.array([(at, height) for at, height in self._sonar if t[0] <= at <= t[-1]]).reshape(-1, 2)
         below = np.column_stack([np.interp(said[:, 0], t, path[:, axis]) for axis in range(3)])
-        R_RB = np.einsum("kji,jl->kil", chart.R, self.rig.R_CB)
-        off = chart.euler[:, 2] - np.arctan2(R_RB[:, 1, 0], R_RB[:, 0, 0])
-        heading = float(np.mean(np.arctan2(np.sin(off), np.cos(off))))
         found = scale.similarity(chart.X, self._anchor, below, said[:, 1], s, self._grown < 2 * s.scale_frames)
         if isinstance(found, str):
             self.reason = found
             return
         chart.move(*found)
-        origin = np.array([*self._anchor[:2], 0.0])
-        turn = from_euler(0.0, 0.0, heading)
-        chart.move(1.0, turn, origin - turn @ origin)
+        if s.start_heading is None:  # else the first keyframe's is right as it is
+            R_RB = np.einsum("kji,jl->kil", chart.R, self.rig.R_CB)
+            off = chart.euler[:, 2] - np.arctan2(R_RB[:, 1, 0], R_RB[:, 0, 0])
+            turn = from_euler(0.0, 0.0, math.atan2(float(np.sin(off).mean()), float(np.cos(off).mean())))
+            chart.move(1.0, turn, self._anchor - turn @ self._anchor)
         chart.metric, self.reason = True, ""
         self._sonar, self._sonar_path = [], []
         self._last = None  # poses before this are in other units
