@@ -333,7 +333,8 @@ def estimate(**values: float) -> Estimate:
 def test_predicted_edges_go_through_the_projected_corners():
     e = estimate(x=-600.0, y=-10.0, H=32.0, phi=0.03, theta=0.02, psi=0.01)
     pan, tilt = -0.01, -0.045
-    lines = overlay.predicted_edges(e, pan, tilt, CAMERA)
+    lines, drawn = overlay.predicted_edges([e], [(pan, tilt)], CAMERA)
+    assert drawn.tolist() == [4]
     R_RB = from_euler(0.03, 0.02, 0.01)
     R_CR = camera_from_body(pan, tilt) @ R_RB.T
     p_RC = np.array([-600.0, -10.0, -32.0]) + R_RB @ synthetic.LEVER
@@ -348,7 +349,7 @@ def test_predicted_edges_go_through_the_projected_corners():
 
 @pytest.mark.parametrize("x", [-30.0, 5.0, 900.0, 1675.0])
 def test_predicted_edges_over_the_runway_stay_in_the_image(x):
-    lines = overlay.predicted_edges(estimate(x=x, H=4.0), 0.0, 0.0, CAMERA)
+    lines, _ = overlay.predicted_edges([estimate(x=x, H=4.0)], [(0.0, 0.0)], CAMERA)
     assert Feature.THRESHOLD not in lines.feature
     assert np.isfinite(lines.ends).all()
     assert (lines.ends >= -0.5 - 1e-9).all()
@@ -364,8 +365,21 @@ def test_predicted_edges_over_the_runway_stay_in_the_image(x):
 
 def test_clipping_by_hand():
     k = Intrinsics.centred(11, 11, 100.0)
-    np.testing.assert_allclose(overlay._clip((-10.5, 5.0), (20.5, 5.0), k), [[-0.5, 5.0], [10.5, 5.0]])
-    assert overlay._clip((-5.0, -5.0), (-5.0, 20.0), k) is None
+    lines = np.array([[(-10.5, 5.0), (20.5, 5.0)], [(-5.0, -5.0), (-5.0, 20.0)], [(3.0, 4.0), (5.0, 30.0)]])
+    ends, inside = overlay._clip(lines, k)
+    assert inside.tolist() == [True, False, True]
+    np.testing.assert_allclose(ends[0], [[-0.5, 5.0], [10.5, 5.0]])
+    np.testing.assert_allclose(ends[2], [[3.0, 4.0], [3.5, 10.5]])
+
+
+def test_edges_of_many_images_are_those_of_each():
+    several = [estimate(x=x, y=3.0, H=4.0 - 0.05 * x, phi=phi) for x in (-900.0, -5.0, 700.0) for phi in (-1.8, 0.4)]
+    angles = [(0.01 * i, -0.02) for i in range(len(several))]
+    lines, drawn = overlay.predicted_edges(several, angles, CAMERA)
+    alone = [overlay.predicted_edges([e], [a], CAMERA)[0] for e, a in zip(several, angles)]
+    assert drawn.tolist() == [len(each.feature) for each in alone]
+    np.testing.assert_array_equal(lines.ends, np.concatenate([each.ends for each in alone]))
+    np.testing.assert_array_equal(lines.feature, np.concatenate([each.feature for each in alone]))
 
 
 def test_measured_edge_lies_at_the_measured_displacement():
@@ -446,7 +460,7 @@ def test_recorded_overlays_belong_to_their_image(recording):
     known = [step for step in shown if step.estimate.valid]
     for step, predicted in zip(known, rows("predicted", "strips"), strict=True):
         sample = overlay.camera_sample(step.samples)[1]
-        lines = overlay.predicted_edges(step.estimate, sample.pan, sample.tilt, CAMERA)
+        lines, _ = overlay.predicted_edges([step.estimate], [(sample.pan, sample.tilt)], CAMERA)
         np.testing.assert_allclose(predicted, lines.ends, atol=1e-3)
 
 

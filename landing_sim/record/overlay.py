@@ -18,7 +18,6 @@ NEAR = 2.0  # [m] in front of the camera, where edges are cut off
 HALF_EDGE = 7.0  # [px] half the drawn length of a measured edge
 
 Colour = tuple[int, int, int]
-Ends = tuple[tuple[float, float], tuple[float, float]]  # [px]
 FEATURE_COLOURS: dict[Feature, Colour] = {
     Feature.LEFT: (64, 200, 255),
     Feature.RIGHT: (255, 176, 32),
@@ -55,30 +54,34 @@ class BelievedCamera:
     slope: float  # [rad] > 0 uphill
 
 
-def predicted_edges(estimate: Estimate, pan: float, tilt: float, camera: BelievedCamera) -> Segments:
-    """Runway outline and horizon as the estimate and the encoder angles [rad] put them into the image.
+def predicted_edges(
+    estimates: Sequence[Estimate], angles: Sequence[tuple[float, float]], camera: BelievedCamera
+) -> tuple[Segments, np.ndarray]:
+    """Runway outline and horizon as estimates and encoder angles (pan, tilt) [rad] put them into as many images (n).
 
-    A part that is behind the camera or outside the image is cut away; an edge wholly outside is left out.
+    A part that is behind the camera or outside the image is cut away; an edge wholly outside is left out. Returns the
+    segments of all images one after the other, and how many each has (n,).
     """
-    R_RB = from_euler(estimate["phi"], estimate["theta"], estimate["psi"])
-    R_CR = camera_from_body(pan, tilt) @ R_RB.T
-    p_RC = np.array([estimate["x"], estimate["y"], -estimate["H"]]) + R_RB @ camera.lever_B
-    half, k = 0.5 * estimate.get("W", camera.width), camera.intrinsics
-    x, z = camera.length * math.cos(camera.slope), -camera.length * math.sin(camera.slope)
-    corners = np.array([[0.0, -half, 0.0], [0.0, half, 0.0], [x, -half, z], [x, half, z]])
-    near_left, near_right, far_left, far_right = ((corners - p_RC) @ R_CR.T).tolist()
-    azimuth = math.atan2(R_CR[2, 1], R_CR[2, 0])
-    normal = plane_normal(int(Feature.HORIZON), p_RC, 2.0 * half, camera.slope, azimuth)
-    edges = (
-        (Feature.LEFT, _into_image(near_left, far_left, k)),
-        (Feature.RIGHT, _into_image(near_right, far_right, k)),
-        (Feature.THRESHOLD, _into_image(near_left, near_right, k)),
-        (Feature.HORIZON, _across_image(image_line(normal, R_CR, k.f, k.cx, k.cy).tolist(), k)),
-    )
-    seen = [(feature, ends) for feature, ends in edges if ends is not None]
-    return Segments(
-        np.array([ends for _, ends in seen]).reshape(-1, 2, 2), np.array([feature for feature, _ in seen], np.int64)
-    )
+    n, k = len(estimates), camera.intrinsics
+    R_CR, p_RC, width, horizon = np.empty((n, 3, 3)), np.empty((n, 3)), np.empty(n), np.empty((n, 3))
+    for i, (e, (pan, tilt)) in enumerate(zip(estimates, angles, strict=True)):
+        R_RB = from_euler(e["phi"], e["theta"], e["psi"])
+        R_CR[i] = camera_from_body(pan, tilt) @ R_RB.T
+        p_RC[i] = (e["x"], e["y"], -e["H"]) + R_RB @ camera.lever_B
+        width[i] = e.get("W", camera.width)
+        azimuth = math.atan2(R_CR[i, 2, 1], R_CR[i, 2, 0])
+        normal = plane_normal(int(Feature.HORIZON), p_RC[i], width[i], camera.slope, azimuth)
+        horizon[i] = image_line(normal, R_CR[i], k.f, k.cx, k.cy)
+    far = (camera.length * math.cos(camera.slope), 0.0, -camera.length * math.sin(camera.slope))
+    left = np.outer(width, (0.0, -0.5, 0.0))
+    corners = np.stack([left, -left, left + far, far - left], axis=1)
+    near_left, near_right, far_left, far_right = ((corners - p_RC[:, None]) @ R_CR.swapaxes(1, 2)).swapaxes(0, 1)
+    sides = ((near_left, far_left), (near_right, far_right), (near_left, near_right))
+    sides_uv, in_front = _into_image(np.stack([np.stack(ends, axis=1) for ends in sides], axis=1), k)
+    ends, inside = _clip(np.concatenate([sides_uv, _across_image(horizon, k)[:, None]], axis=1), k)
+    inside[:, :3] &= in_front
+    features = np.broadcast_to([Feature.LEFT, Feature.RIGHT, Feature.THRESHOLD, Feature.HORIZON], inside.shape)
+    return Segments(ends[inside], features[inside]), inside.sum(axis=1)
 
 
 def joined(sets: Sequence[EdgeSet]) -> EdgeSet:
@@ -123,38 +126,30 @@ def camera_sample(samples: tuple[Sample, ...]) -> tuple[float, CameraSample] | N
     return next(((sample.t_valid, sample.data) for sample in samples if isinstance(sample.data, CameraSample)), None)
 
 
-def _into_image(a: Sequence[float], b: Sequence[float], k: Intrinsics) -> Ends | None:
-    """The visible part of the segment from a to b, both in frame C; None if there is none."""
-    if a[2] < NEAR and b[2] < NEAR:
-        return None
-    if a[2] < NEAR or b[2] < NEAR:
-        s = (NEAR - a[2]) / (b[2] - a[2])
-        cut = [p + s * (q - p) for p, q in zip(a, b)]
-        a, b = (cut, b) if a[2] < NEAR else (a, cut)
-    start, stop = ((k.cx + k.f * p[0] / p[2], k.cy + k.f * p[1] / p[2]) for p in (a, b))
-    return _clip(start, stop, k)
+def _into_image(ends: Array, k: Intrinsics) -> tuple[Array, np.ndarray]:
+    """Images (..., 2, 2) of segments (..., 2, 3) in frame C, cut off NEAR; False where nothing is farther than that."""
+    a, b = ends[..., 0, :], ends[..., 1, :]
+    behind = ends[..., 2] < NEAR
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cut = a + ((NEAR - a[..., 2]) / (b[..., 2] - a[..., 2]))[..., None] * (b - a)
+        seen = np.where(behind[..., None], cut[..., None, :], ends)
+        return np.array([k.cx, k.cy]) + k.f * seen[..., :2] / seen[..., 2:], ~behind.all(axis=-1)
 
 
-def _across_image(l: Sequence[float], k: Intrinsics) -> Ends | None:
-    """Where a line crosses the image."""
-    if abs(l[1]) >= abs(l[0]):
-        a, b = ((u, -(l[2] + l[0] * u) / l[1]) for u in (-0.5, k.width - 0.5))
-    else:
-        a, b = ((-(l[2] + l[1] * v) / l[0], v) for v in (-0.5, k.height - 0.5))
-    return _clip(a, b, k)
+def _across_image(l: Array, k: Intrinsics) -> Array:
+    """(n, 2, 2) where lines (n, 3) cross the image's left and right border, or the upper and lower one if steep."""
+    a, b, c = l.T[..., None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        u, v = np.array([-0.5, k.width - 0.5]), np.array([-0.5, k.height - 0.5])
+        level = np.stack(np.broadcast_arrays(u, -(c + a * u) / b), axis=-1)
+        steep = np.stack(np.broadcast_arrays(-(c + b * v) / a, v), axis=-1)
+    return np.where((abs(b) >= abs(a))[..., None], level, steep)
 
 
-def _clip(a: tuple[float, float], b: tuple[float, float], k: Intrinsics) -> Ends | None:
-    """Liang-Barsky: the part of a-b inside the image; None if there is none."""
-    (u, v), du, dv = a, b[0] - a[0], b[1] - a[1]
-    enter, leave = 0.0, 1.0
-    bounds = ((-du, u + 0.5), (du, k.width - 0.5 - u), (-dv, v + 0.5), (dv, k.height - 0.5 - v))
-    for step, room in bounds:
-        if step == 0.0:
-            if room < 0.0:
-                return None
-        elif step < 0.0:
-            enter = max(enter, room / step)
-        else:
-            leave = min(leave, room / step)
-    return ((u + enter * du, v + enter * dv), (u + leave * du, v + leave * dv)) if enter < leave else None
+def _clip(ends: Array, k: Intrinsics) -> tuple[Array, np.ndarray]:
+    """Liang-Barsky: the parts of segments (..., 2, 2) inside the image; False where there is none."""
+    a, way = ends[..., 0, :], ends[..., 1, :] - ends[..., 0, :]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = np.stack([(-0.5 - a) / way, (np.array([k.width, k.height]) - 0.5 - a) / way])
+        enter, leave = np.maximum(t.min(axis=0).max(axis=-1), 0.0), np.minimum(t.max(axis=0).min(axis=-1), 1.0)
+        return np.stack([a + enter[..., None] * way, a + leave[..., None] * way], axis=-2), enter < leave

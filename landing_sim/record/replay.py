@@ -50,7 +50,8 @@ class _Shot:
 
     t: float  # [s]
     jpeg: bytes
-    predicted: overlay.Segments | None
+    estimate: Estimate  # of the time when it was exposed
+    angles: tuple[float, float]  # [rad] what the platform's encoders said then: pan, tilt
     edges: Measurement | None
     residuals: Residuals | None
 
@@ -100,10 +101,11 @@ class Recorder:
         # from when it was due, not from when an image came: the rate is kept on average
         due = self._next_frame if self._next_frame > step.truth.t - self._period else step.truth.t
         self._next_frame = due + self._period
-        then = min(self._past, key=lambda estimate: abs(estimate.t - exposed))  # an image may be old when it arrives
-        predicted = overlay.predicted_edges(then, sample.pan, sample.tilt, self._scene.camera) if then.valid else None
+        past = reversed(self._past)  # an image may be old when it arrives
+        then = next((estimate for estimate in past if estimate.t <= exposed + 1e-9), self._past[0])
         edges = next((m for m in step.measurements if m.geometry is not None), None)
-        self._shots.append(_Shot(step.truth.t, _jpeg(sample.frame.full()), predicted, edges, step.residuals))
+        jpeg, angles = _jpeg(sample.frame.full()), (sample.pan, sample.tilt)
+        self._shots.append(_Shot(step.truth.t, jpeg, then, angles, edges, step.residuals))
         if self._live or len(self._shots) == TOGETHER:
             self._send()
         if self._live:
@@ -130,7 +132,9 @@ class Recorder:
         rr = rerun()
 
         def send(entity: str, which: Sequence[_Shot], columns: Any) -> None:
-            self._stream.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=[s.t for s in which])], columns)
+            self._stream.send_columns(
+                entity, [rr.TimeColumn(TIMELINE, duration=np.array([s.t for s in which]))], columns
+            )
 
         def strips(entity: str, which: Sequence[_Shot], counts: Any, ends: np.ndarray, **colours: np.ndarray) -> None:
             columns = rr.LineStrips2D.columns(strips=ends.astype(np.float32), **colours)
@@ -138,11 +142,11 @@ class Recorder:
 
         if shots:
             send(IMAGE, shots, rr.EncodedImage.columns(blob=[s.jpeg for s in shots]))
-        known = [(s, s.predicted) for s in shots if s.predicted is not None]
+        known = [s for s in shots if s.estimate.valid]
         if known:
-            ends, feature = (np.concatenate(c) for c in zip(*((lines.ends, lines.feature) for _, lines in known)))
-            counts = [len(lines.ends) for _, lines in known]
-            strips("predicted", [s for s, _ in known], counts, ends, colors=FEATURES[feature])
+            camera = self._scene.camera
+            lines, drawn = overlay.predicted_edges([s.estimate for s in known], [s.angles for s in known], camera)
+            strips("predicted", known, drawn, lines.ends, colors=FEATURES[lines.feature])
         looked = [(s, s.edges, s.edges.geometry) for s in shots if s.edges is not None and s.edges.geometry is not None]
         if looked:
             which, counts = [s for s, _, _ in looked], [len(edges.z) for _, edges, _ in looked]
