@@ -47,7 +47,7 @@ class Flight:
 
 def fly(
     scenario: Scenario,
-    vehicle: Vehicle,
+    vehicle: Vehicle | None,
     watch: Callable[[Step], None] | None = None,
     recording: Path | None = None,
     live: bool = False,
@@ -56,6 +56,7 @@ def fly(
 ) -> Flight:
     """Fly it to its end.
 
+    vehicle : of a mission that lets the scenario choose one; of others None
     watch : called with every step
     recording : where to write one for the viewer; None leaves it out
     live : show it in the viewer while it flies; needs a recording
@@ -65,7 +66,9 @@ def fly(
     Raises ScenarioError where the aircraft cannot fly what the scenario wants at the start, ReplayError from the recording.
     """
     if scenario.mission not in MISSIONS:
-        return _others(scenario, watch, recording, live, noise)
+        return _others(scenario, watch, recording, live, noise, other)
+    if vehicle is None:
+        raise ValueError(f"{scenario.name}: this mission needs a vehicle")
     started = time.perf_counter()
     try:
         mission = MISSIONS[scenario.mission](scenario, vehicle, scenario.seed, scenario.run, noise)
@@ -111,6 +114,7 @@ def _others(
     recording: Path | None,
     live: bool,
     noise: Callable[[str], NoiseStream] | None,
+    other: log.FlightLog | None,
 ) -> Flight:
     """Missions that bring a flight of their own; each loads what only it needs."""
     if scenario.mission == "lunar_landing":
@@ -119,7 +123,7 @@ def _others(
         return lunar_flight.fly(scenario, watch, recording, live, noise)
     from landing_sim.missions import quadrotor_flight
 
-    return quadrotor_flight.fly(scenario, watch, recording, live, noise)
+    return quadrotor_flight.fly(scenario, watch, recording, live, noise, other)
 
 
 def _looks(scenario: Scenario) -> tuple[float, ...]:

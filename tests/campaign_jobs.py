@@ -7,7 +7,7 @@ import signal
 from pathlib import Path
 
 from landing_sim.campaign.dispersions import draw
-from landing_sim.campaign.landing import FIGURES, Landing, land
+from landing_sim.campaign.landing import Landing, land
 from landing_sim.campaign.plan import Plan
 
 
@@ -36,7 +36,7 @@ def cheap(plan: Plan, run: int) -> Landing:
 
 def held(plan: Plan, run: int) -> Landing:
     """No flight: banked beyond any limit where the sweep is at its third value."""
-    figures = dict.fromkeys(FIGURES, 1.0) | {"peak_roll_deg": 99.0 if run % 3 == 2 else 0.0}
+    figures = dict.fromkeys(plan.figures(), 1.0) | {"peak_roll_deg": 99.0 if run % 3 == 2 else 0.0}
     return Landing(run, "landed", "", figures, draw(plan.campaign, run))
 
 
@@ -46,7 +46,7 @@ def windy(plan: Plan, run: int) -> Landing:
     if values["wind.headwind_mps"] > 9.85:
         return Landing(run, "crash", values=values)
     sink = (1.8 if values["wind.crosswind_mps"] > 4.9 else 0.8) + 0.1 * (run // 2)
-    return Landing(run, "landed", "", dict.fromkeys(FIGURES, 1.0) | {"sink_rate_mps": sink}, values)
+    return Landing(run, "landed", "", dict.fromkeys(plan.figures(), 1.0) | {"sink_rate_mps": sink}, values)
 
 
 def square(number: int) -> int:

@@ -8,19 +8,20 @@ from pathlib import Path
 import numpy as np
 
 from landing_sim.campaign.dispersions import draw
-from landing_sim.campaign.landing import FIGURES, Landing
-from landing_sim.campaign.plan import METRICS, NEES_BANDS, Plan
+from landing_sim.campaign.figures import NEES_BANDS
+from landing_sim.campaign.landing import Landing
+from landing_sim.campaign.plan import Plan
 from landing_sim.campaign.store import Store
 
 
 def fill(folder: Path, plan: Plan, runs: int, seed: int = 1, crashes: int = 0) -> None:
     """Landings whose touchdown follows the wind and the mass, the last `crashes` of which never touched down."""
     rng = np.random.default_rng(seed)
-    with Store(folder, plan, FIGURES) as store, store.session(workers=2, engine="forkserver"):
+    with Store(folder, plan, plan.figures()) as store, store.session(workers=2, engine="forkserver"):
         for run in range(runs):
             values = draw(plan.campaign, run)
             head, cross = values.get("wind.headwind_mps", 0.0), values.get("wind.crosswind_mps", 0.0)
-            figures = dict.fromkeys((*METRICS, *NEES_BANDS), math.nan)
+            figures = dict.fromkeys(plan.figures(), math.nan)
             n = rng.normal(size=12)
             figures |= {
                 "touchdown_x_m": 400.0 - 8.0 * head + 35.0 * n[0],

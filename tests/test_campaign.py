@@ -133,7 +133,8 @@ def test_two_at_once_in_one_folder_are_refused(campaign: Path, tmp_path: Path) -
     code = f"""
 from pathlib import Path
 from landing_sim.campaign import file, store, landing
-with store.Store(Path({str(tmp_path / "o")!r}), file.load({str(campaign)!r}), landing.FIGURES):
+plan = file.load({str(campaign)!r})
+with store.Store(Path({str(tmp_path / "o")!r}), plan, plan.figures()):
     print("in", flush=True)
     input()
 """

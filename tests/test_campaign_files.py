@@ -16,7 +16,8 @@ from landing_sim import paths, scenario
 from landing_sim.campaign import file
 from landing_sim.campaign.dispersions import draw, normals
 from landing_sim.campaign.distributions import Distribution, quantile
-from landing_sim.campaign.landing import FIGURES, scenario_of
+from landing_sim.campaign.figures import figures
+from landing_sim.campaign.landing import scenario_of
 from landing_sim.campaign.plan import Campaign, Plan
 from landing_sim.campaign.units import FACTORS, factor
 from landing_sim.noise import Noise
@@ -210,7 +211,7 @@ def test_figures_are_the_judges(tmp_path: Path) -> None:
     from landing_sim.campaign.landing import measure
 
     wanted = scenario.load("do128/gust", ["time.limit_s=1.2"])
-    assert tuple(measure(fly("do128/gust", "time.limit_s=1.2"), wanted)) == FIGURES
+    assert tuple(measure(fly("do128/gust", "time.limit_s=1.2"), wanted)) == figures("runway_landing")
 
 
 # ------------------------------------------------------------------------------------------------ distributions

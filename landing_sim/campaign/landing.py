@@ -17,9 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from landing_sim import config, runner, scenario, vehicle, yamlfile
+from landing_sim import config, runner, scenario, yamlfile
 from landing_sim.campaign.dispersions import draw
-from landing_sim.campaign.plan import METRICS, NEES_BANDS, Campaign, Plan
+from landing_sim.campaign.figures import GOOD, NEES_BANDS, figures
+from landing_sim.campaign.plan import Campaign, Plan
 from landing_sim.errors import ConfigError, Mark
 from landing_sim.noise import NoiseStream
 from landing_sim.record import parquet
@@ -27,9 +28,7 @@ from landing_sim.record.judge import counted
 from landing_sim.record.log import FlightLog
 from landing_sim.scenario import Scenario
 from landing_sim.vehicle import Vehicle
-
-FIGURES = (*METRICS, *NEES_BANDS)
-"""Columns that every landing has; NaN where it gives none."""
+from landing_sim.vehicle import load as load_vehicle
 
 GEAR_HEIGHT_AT = 60.0  # [m] past the threshold
 
@@ -41,7 +40,7 @@ class Landing:
     run: int
     outcome: str  # that of the judge, "cannot_fly" or "worker_killed"
     reason: str = ""  # of an outcome that the figures do not explain
-    figures: Mapping[str, float] | None = None  # by FIGURES; None: all NaN
+    figures: Mapping[str, float] | None = None  # by Plan.figures; None: all NaN
     values: Mapping[str, Any] | None = None  # drawn, derived, swept; by name or path
     wall_s: float = math.nan
     cpu_s: float = math.nan
@@ -59,17 +58,17 @@ def land(plan: Plan, run: int) -> Landing:
     try:
         wanted, flight = fly(plan, run, values)
     except ConfigError as error:
-        outcome, reason, figures = "cannot_fly", str(error), None
+        outcome, reason, found = "cannot_fly", str(error), None
     else:
         outcome, reason = flight.verdict.outcome, str(flight.log.meta.get("reason", ""))
-        figures = measure(flight, wanted)
-        if kept(plan.campaign, outcome, figures):
+        found = measure(flight, wanted)
+        if kept(plan.campaign, outcome, found):
             history = _parquet(flight.log)
     return Landing(
         run,
         outcome,
         reason,
-        figures,
+        found,
         values,
         time.perf_counter() - wall,
         time.process_time() - cpu,
@@ -101,7 +100,7 @@ def fly(
     if values is None:
         values = draw(plan.campaign, run, noise)
     wanted = scenario_of(plan, run, values, changes)
-    return wanted, runner.fly(wanted, _vehicle(wanted.aircraft.model), noise=noise, recording=recording, other=other)
+    return wanted, runner.fly(wanted, _vehicle(wanted), noise=noise, recording=recording, other=other)
 
 
 def scenario_of(plan: Plan, run: int, values: Mapping[str, Any], changes: Sequence[str] = ()) -> Scenario:
@@ -118,17 +117,19 @@ def scenario_of(plan: Plan, run: int, values: Mapping[str, Any], changes: Sequen
 
 
 def measure(flight: runner.Flight, wanted: Scenario) -> dict[str, float]:
-    """Every figure that a campaign keeps, by FIGURES."""
+    """Every figure that a campaign keeps, by figures.figures."""
     log, touchdown = flight.log, flight.log.touchdown
-    gear = _vehicle(wanted.aircraft.model).guidance.gear
-    found = dict(flight.verdict.metrics)
+    found, vehicle = dict(flight.verdict.metrics), _vehicle(wanted)
+    if vehicle is None:
+        return {name: found.get(name, math.nan) for name in figures(wanted.mission)}
+    gear = vehicle.guidance.gear
     found["touchdown_sideslip_deg"] = math.nan if touchdown is None else math.degrees(touchdown.sideslip)
     found["gear_height_60m_m"] = gear_height(log, gear.forward_m, gear.down_m, GEAR_HEIGHT_AT)
     count, x = counted(log) & np.isfinite(log["nees"]) & (log["nees_dof"] > 0), log["true_x_m"]
     for name, (low, high) in NEES_BANDS.items():
         use = count & (x >= low) & (x < high)
         found[name] = float(log["nees"][use].sum() / log["nees_dof"][use].sum()) if use.any() else math.nan
-    return {name: found[name] for name in FIGURES}
+    return {name: found[name] for name in figures(wanted.mission)}
 
 
 def gear_height(log: FlightLog, forward: float, down: float, x: float) -> float:
@@ -154,12 +155,17 @@ def kept(campaign: Campaign, outcome: str, figures: Mapping[str, float]) -> bool
         or (risk.below is not None and figures[risk.metric] < risk.below)
         for risk in campaign.risks
     )
-    return outcome != "landed" or any(met)
+    return outcome not in GOOD or any(met)
+
+
+def _vehicle(wanted: Scenario) -> Vehicle | None:
+    """Of missions that let the scenario choose one."""
+    return _loaded(wanted.aircraft.model) if wanted.mission == "runway_landing" else None
 
 
 @functools.cache
-def _vehicle(name: str) -> Vehicle:
-    return vehicle.load(name)
+def _loaded(name: str) -> Vehicle:
+    return load_vehicle(name)
 
 
 @functools.cache

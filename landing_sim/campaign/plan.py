@@ -4,31 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, get_args
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from landing_sim import paths
+from landing_sim.campaign import figures
 from landing_sim.campaign.distributions import Correlation, Derived, Distribution, Unit, derive, quantile
 from landing_sim.campaign.units import factor
 from landing_sim.config import Section
 from landing_sim.errors import ConfigError
-from landing_sim.sections.judged import Metric
-
-EXTRA_METRICS = ("touchdown_sideslip_deg", "gear_height_60m_m")
-"""What a campaign judges beyond `record.judge.measure`."""
-METRICS: tuple[str, ...] = (*get_args(Metric), *EXTRA_METRICS)
-NEES_BANDS: dict[str, tuple[float, float]] = {
-    "nees_beyond_3000m": (-math.inf, -3000.0),
-    "nees_3000_1000m": (-3000.0, -1000.0),
-    "nees_1000_300m": (-1000.0, -300.0),
-    "nees_300_0m": (-300.0, 0.0),
-    "nees_over_runway": (0.0, math.inf),
-}
-"""Figures of the estimate's consistency over a stretch of x [m] each: mean squared error over variance, per state."""
 
 
 class CampaignError(ConfigError):
@@ -122,11 +110,25 @@ class Plan:
             key: value for key, value in self.scenario.items() if key not in ("name", "description", "criteria")
         }
         digest = hashlib.sha256(json.dumps([kept, scenario], sort_keys=True).encode())
-        folder = paths.aircraft_folder(str(self.scenario["aircraft"]["model"]))
+        folder = self._folder()
         for file in sorted(p for p in folder.rglob("*") if p.suffix in (".xml", ".yaml")):
             digest.update(file.relative_to(folder).as_posix().encode())
             digest.update(file.read_bytes())
         return digest.hexdigest()
+
+    @property
+    def mission(self) -> str:
+        """The scenario's."""
+        return str(self.scenario["mission"])
+
+    def figures(self) -> tuple[str, ...]:
+        """Columns of the results that every flight has."""
+        return figures.figures(self.mission)
+
+    def _folder(self) -> Path:
+        if self.mission in figures.FOLDERS:
+            return paths.data_folder("aircraft") / figures.FOLDERS[self.mission]
+        return paths.aircraft_folder(str(self.scenario["aircraft"]["model"]))
 
 
 def assemble(

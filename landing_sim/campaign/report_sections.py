@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from landing_sim.campaign import report_figures, verdict
-from landing_sim.campaign.plan import NEES_BANDS, Campaign, Plan
+from landing_sim.campaign.figures import NEES_BANDS, SCATTER
+from landing_sim.campaign.plan import Campaign, Plan
 from landing_sim.campaign.report_figures import label
 from landing_sim.campaign.sensitivity import strongest
 from landing_sim.campaign.store import Results
@@ -22,7 +23,6 @@ from landing_sim.campaign.verdict import Judged, Risk
 from landing_sim.papers.report import number
 from landing_sim.types import Array
 
-SCATTER = ("touchdown_x_m", "touchdown_y_m", "sink_rate_mps", "touchdown_bank_deg")
 WORST = 10
 SHORT = {verdict.PASS: "PASS", verdict.FAIL: "FAIL", verdict.OPEN: "not enough"}
 
@@ -129,8 +129,10 @@ def rare_events(details: Mapping[str, Mapping[str, Any]]) -> list[Section]:
     return [Section("Rare-event runs", lead, tables=(table,))]
 
 
-def footprint(results: Results, plan: Plan, rows: Sequence[Judged]) -> Section:
-    """Touchdowns on the drawn runway, with the legal box."""
+def footprint(results: Results, plan: Plan, rows: Sequence[Judged]) -> list[Section]:
+    """Touchdowns on the drawn runway, with the legal box; nothing where there is no runway."""
+    if plan.mission != "runway_landing":
+        return []
     columns, outcome = results.columns, results.outcome
     runway = plan.scenario["runway"]
     x, y = columns["touchdown_x_m"], columns["touchdown_y_m"]
@@ -150,7 +152,7 @@ def footprint(results: Results, plan: Plan, rows: Sequence[Judged]) -> Section:
         )
     if (~known).any():
         caption += f" {int((~known).sum())} flights never touched the ground on their wheels."
-    return Section("Where they touched down", figures=(Picture(svg, caption=caption),))
+    return [Section("Where they touched down", figures=(Picture(svg, caption=caption),))]
 
 
 def _box(rows: Sequence[Judged]) -> tuple[float | None, float | None, float | None]:
@@ -228,10 +230,10 @@ def worst(results: Results, rows: Sequence[Judged], use: np.ndarray, folder: Pat
     return Section(title, lead, tables=(Table(headings, tuple(lines), right, ("watch it",)),))
 
 
-def sensitivity(results: Results, use: np.ndarray) -> list[Section]:
+def sensitivity(results: Results, use: np.ndarray, mission: str) -> list[Section]:
     """Which draws explain the scatter at touchdown."""
     columns = {name: column[use] for name, column in results.columns.items()}
-    found = strongest(SCATTER, columns, results.dispersed, results.campaign.seed)
+    found = strongest(SCATTER[mission], columns, results.dispersed, results.campaign.seed)
     if not found:
         return []
     figures = tuple(Picture(report_figures.effects(found[k : k + 2])) for k in range(0, len(found), 2))

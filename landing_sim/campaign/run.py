@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from landing_sim.campaign import pool
-from landing_sim.campaign.landing import FIGURES, Landing, land
+from landing_sim.campaign.landing import Landing, land
 from landing_sim.campaign.machine import caches_warm
 from landing_sim.campaign.plan import Plan
 from landing_sim.campaign.store import AGAIN, Store
@@ -50,7 +50,7 @@ def fly(
     aside = []
     count = workers or _cores()
     where = {"workers": count, "engine": method} if cluster is None else {"workers": None, "engine": "dask"}
-    with Store(folder, plan, FIGURES) as store:
+    with Store(folder, plan, plan.figures()) as store:
         missing = store.missing(plan.campaign.runs)
         if not missing:
             return []

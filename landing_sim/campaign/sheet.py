@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from landing_sim.campaign import verdict
+from landing_sim.campaign.figures import GOOD
 from landing_sim.campaign.store import FILE, HISTORIES, Results
 from landing_sim.campaign.units import factor
 
@@ -104,7 +105,7 @@ def table(found: Mapping[str, Any], results: Results, folder: Path) -> None:
         console.print(f"{title}: the file names no risk", highlight=False)
     outcomes = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in found["outcomes"].items())
     console.print(f"Outcomes: {outcomes or 'none'}", highlight=False)
-    odd = [int(run) for run, end in zip(results.columns["run"], results.outcome) if end != "landed"]
+    odd = [int(run) for run, end in zip(results.columns["run"], results.outcome) if end not in GOOD]
     if odd:
         shown = ", ".join(map(str, odd[:10])) + (f" and {len(odd) - 10} more" if len(odd) > 10 else "")
         console.print(f"Not landed: {shown}", highlight=False)

@@ -15,7 +15,7 @@ from landing_sim.interfaces import NoiseStream
 from landing_sim.missions.quadrotor_landing import Mission, build
 from landing_sim.plants.jsbsim import PlantError
 from landing_sim.record import judge, log
-from landing_sim.sections.quadrotor import QuadrotorScenario
+from landing_sim.sections.quadrotor import METRICS, QuadrotorScenario
 from landing_sim.signals import Step
 from landing_sim.types import Array
 from landing_sim.world.planes import Box
@@ -34,13 +34,6 @@ ROTORS = {
 }
 """Columns of the log that an aircraft has its surfaces in."""
 ERRORS = {"x": "m", "y": "m", "H": "m", "vx": "m/s", "vy": "m/s", "vz": "m/s"}
-METRICS = (
-    *("hover_rms_m", "hover_x_rms_m", "hover_y_rms_m", "hover_z_rms_m", "hover_p99_m"),
-    *("miss_m", "sink_rate_mps", "touchdown_tilt_deg", "flight_s", "cross_track_rms_m"),
-    *("way_point_error_m", "platform_height_m", "platform_height_error_m"),
-    *("position_error_rms_m", "fix_error_rms_m", "unlocalised_s"),
-)
-"""Figures of a flight; NaN where it gives none."""
 
 
 def fly(
@@ -49,8 +42,12 @@ def fly(
     recording: Path | None = None,
     live: bool = False,
     noise: Callable[[str], NoiseStream] | None = None,
+    other: log.FlightLog | None = None,
 ) -> Flight:
-    """Fly it to its end. Raises ScenarioError where it cannot begin, ReplayError from the recording."""
+    """Fly it to its end; the path of `other` is shown beside.
+
+    Raises ScenarioError where it cannot begin, ReplayError from the recording.
+    """
     from landing_sim import runner
 
     started = time.perf_counter()
@@ -81,7 +78,7 @@ def fly(
     )
     _add(flown, np.array(told))
     if camera is not None:
-        camera.close(flown)
+        camera.close(flown, other)
     return runner.Flight(flown, verdict(flown, scenario, mission), time.perf_counter() - started)
 
 

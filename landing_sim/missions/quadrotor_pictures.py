@@ -53,9 +53,9 @@ class Pictures:
             self._recorder.picture(samples[-1].t_valid, samples[-1].data.frame.full(), self._sight())
         self._due = step.truth.t + self._period
 
-    def close(self, flown: FlightLog) -> None:
-        """The log; then the file is complete."""
-        self._recorder.close(flown)
+    def close(self, flown: FlightLog, other: FlightLog | None = None) -> None:
+        """The log, and another's path; then the file is complete."""
+        self._recorder.close(flown, other)
 
     def _sight(self) -> Sight | None:
         looking = self._looking

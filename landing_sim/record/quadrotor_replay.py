@@ -20,6 +20,7 @@ from landing_sim.record.viewer import ReplayError, start_live_viewer
 from landing_sim.types import Array
 
 WANTED_COLOUR, PLACE_COLOUR, FIX_COLOUR = (235, 80, 80), (60, 255, 90), (120, 170, 255)
+OTHER_COLOUR = (120, 150, 255)
 PLANES = np.array([(150, 150, 150), (70, 130, 255), (200, 70, 255)], np.uint8)
 """Colours of features: on nothing known, on the ground, on something raised."""
 IMAGE = "camera/image"
@@ -98,9 +99,13 @@ class QuadrotorRecorder:
                 f"{IMAGE}/way_point", rr.LineStrips2D(cross, colors=PLACE_COLOUR, radii=rr.Radius.ui_points(1.5))
             )
 
-    def close(self, log: FlightLog) -> None:
-        """Everything that does not need pixels; then the file is complete."""
+    def close(self, log: FlightLog, other: FlightLog | None = None) -> None:
+        """Everything that does not need pixels, and the path of another flight; then the file is complete."""
         _record(self._stream, log)
+        if other is not None:
+            path = np.column_stack([other["true_x_m"], other["true_y_m"], other["true_z_m"]])
+            strip = rerun().LineStrips3D([path], colors=OTHER_COLOUR, radii=rerun().Radius.ui_points(1.5))
+            self._stream.log("world/path/other", strip, static=True)
         self._stream.flush()
         self._stream.disconnect()
 

@@ -13,6 +13,12 @@ from landing_sim.config import Section, inconsistent
 from landing_sim.errors import Location
 from landing_sim.sections.bounds import NotNegative, Positive
 
+METRICS = (
+    *("touchdown_x_m", "sink_rate_mps", "touchdown_groundspeed_mps", "touchdown_tilt_deg"),
+    *("H_rms", "q_rms", "theta_rms", "flow_x_rms", "flow_z_rms"),
+)
+"""Figures of a descent."""
+
 
 class Clock(Section):
     """The clock. Every period must be a whole number of steps."""

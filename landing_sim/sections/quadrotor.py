@@ -19,6 +19,14 @@ from landing_sim.sections.faults import Fault
 Metre = Annotated[float, Field(ge=-20, le=20)]
 Share = Annotated[float, Field(ge=0, le=1)]
 
+METRICS = (
+    *("hover_rms_m", "hover_x_rms_m", "hover_y_rms_m", "hover_z_rms_m", "hover_p99_m"),
+    *("miss_m", "sink_rate_mps", "touchdown_tilt_deg", "flight_s", "cross_track_rms_m"),
+    *("way_point_error_m", "platform_height_m", "platform_height_error_m"),
+    *("position_error_rms_m", "fix_error_rms_m", "unlocalised_s"),
+)
+"""Figures of a flight; NaN where it gives none."""
+
 
 class Clock(Section):
     """The clock. Every period must be a whole number of cycles, the cycle a whole number of steps."""
