@@ -336,6 +336,24 @@ def test_last_fix_stands_when_it_is_too_old_and_forgets_what_was_overtaken() -> 
     assert estimator.read(run(estimator, 0.55, *fixes)).flags["localised"]
 
 
+def test_last_fix_answers_for_the_time_of_an_image() -> None:
+    """At 0.14 s, of an image taken at 0.12: 0.5 m/s since the one taken at 0.1, and what the attitude was then."""
+    estimator = LastFix()
+    memory = estimator.init(0.0)
+    for m in (fix(0.0, [0.0, 0.0, -1.0]), fix(0.1, [0.05, 0.0, -1.0], late=0.03)):
+        memory = estimator.update(memory, m)
+    for k in range(15):
+        memory = estimator.predict(memory, Command(), 0.01 * k)
+        memory = estimator.update(memory, reading(0.01 * k, euler=np.array([0.1 * k, 0.0, 0.0])))
+    then, now = estimator.read(memory, 0.12), estimator.read(memory)
+    assert then.t == 0.12 and then["x"] == pytest.approx(0.05 + 0.5 * 0.02) and then["phi"] == pytest.approx(1.2)
+    assert (
+        now.t == pytest.approx(0.14)
+        and now["x"] == pytest.approx(0.05 + 0.5 * 0.01)
+        and now["phi"] == pytest.approx(1.4)
+    )
+
+
 def test_velocity_low_pass_by_hand() -> None:
     estimator = LastFix(LastFixConfig(smoothing=0.1))
     fixes = fix(0.0, [0.0, 0.0, 0.0]), fix(0.1, [0.1, 0.0, 0.0])
