@@ -432,7 +432,7 @@ def test_a_go_around_begins_with_what_is_flown() -> None:
 
 NEAR = {
     "do128": ("initial.x_m=-750", "initial.y_m=0", "initial.height_m=42.5", "initial.heading_deg=0"),
-    "transport": ("initial.x_m=-1000", "initial.height_m=61"),
+    "transport": ("initial.x_m=-1000", "initial.height_m=66"),
 }
 
 
@@ -497,3 +497,12 @@ def test_a_recording_shows_sights_and_signals(tmp_path: Path) -> None:
     told = (tmp_path / "r.rrd").read_bytes()
     for entity in ("world/aircraft/looks/2", "flow/3/seen", "flow/1/true"):
         assert entity.encode() in told, entity
+
+
+def test_where_the_path_ends_can_be_asked_for() -> None:
+    from landing_sim.missions import onboard
+
+    told = scenario.load("transport/inertial_off")
+    own = scenario.load("transport/inertial_off", ["guidance.touchdown_x_m=null"])
+    ends = [onboard.prepared(s, vehicle.load("transport")).guidance.path.touchdown_x_m for s in (told, own)]
+    assert ends == [500.0, vehicle.load("transport").guidance.path.touchdown_x_m]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -230,9 +231,10 @@ def _density(height: float, warmer: float) -> float:
 def prepared(scenario: Scenario, vehicle: Vehicle) -> Vehicle:
     """The vehicle for this approach: a crew knows its mass, the steady headwind and reported turbulence."""
     mass = vehicle.mass_kg if scenario.aircraft.mass_kg is None else scenario.aircraft.mass_kg
-    glide = scenario.guidance.glide_deg
-    if glide is not None:
-        path = replace(vehicle.guidance.path, glide_deg=glide)
+    wanted = {"glide_deg": scenario.guidance.glide_deg, "touchdown_x_m": scenario.guidance.touchdown_x_m}
+    changes: dict[str, Any] = {name: value for name, value in wanted.items() if value is not None}
+    if changes:
+        path = replace(vehicle.guidance.path, **changes)
         vehicle = vehicle.model_copy(update={"guidance": replace(vehicle.guidance, path=path)})
     return vehicle.prepared(mass, scenario.wind.headwind_mps, _air_density(scenario), _reported_turbulence(scenario))
 

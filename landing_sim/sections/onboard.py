@@ -115,6 +115,9 @@ class Guidance(Section):
     """The path that is flown, where it is not the vehicle's own."""
 
     glide_deg: float | None = Field(None, ge=1, le=8, description="angle of the glide path; null = the vehicle's")
+    touchdown_x_m: float | None = Field(
+        None, ge=100, le=2000, description="where the path ends on the runway; null = the vehicle's"
+    )
     lateral_offset_m: float = Field(
         0.0, ge=-20, le=20, description="guidance takes a line this far right (+) of the centreline for it"
     )
