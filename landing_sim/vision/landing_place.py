@@ -32,6 +32,7 @@ from landing_sim.vision.landing_place_top import (
     on_level,
     patches,
     rectangle,
+    uncertainty,
 )
 from landing_sim.vision.landing_place_views import Pair, View, Views
 
@@ -49,7 +50,7 @@ class DetectorSettings:
     link : a wider gap splits what lies on one plane
     border : [px] the image's edge that no feature is looked for in
     shrink : of the rectangle within which no more than `foreign` features, or that share of its own, may be off its plane
-    ring : within it, the nth nearest ground feature beside each side of the rectangle must have been seen
+    nth : of the ground features beside a side, from the nearest, that tells where the place ends at the latest
     doubt : share by which one way point may break the limits of a pool's mean
     same, same_height : a patch whose middle and height are that near to a pool's belongs to it
     """
@@ -58,7 +59,7 @@ class DetectorSettings:
     far: float = 0.6
     age: float = 8.0
     shared: int = 40
-    least: int = 8
+    least: int = 6
     enough: int = 14
     tolerance: float = 0.006
     tries: int = 128
@@ -68,9 +69,8 @@ class DetectorSettings:
     link: float = 0.22
     border: float = 8.0
     shrink: float = 0.04
-    foreign: int = 2
-    foreign_share: float = 0.12
-    ring: float = 0.25
+    foreign: int = 3
+    foreign_share: float = 0.08
     nth: int = 3
     doubt: float = 0.4
     same: float = 0.35
@@ -202,24 +202,25 @@ class LandingPlaceDetector:
     def _candidate(self, pair: Pair, ground: Plane, plane: Plane, at: np.ndarray, X: Array, height: float) -> Candidate:
         """A patch of features `at`, at X (n, 3) [m], among what is known of its place."""
         s = self.settings
+        wide = s.limits.widened(s.doubt)
+        if plane.tilt > wide.tilt or not wide.lowest <= height <= wide.highest:
+            top = rectangle(X)
+            point = _way_point(pair, plane, top, height, len(at))
+            return Candidate(point, outside(height, *point.size, plane.tilt, wide))
         pool = self._pool_of(X.mean(axis=0), height)
         pool.collect(pair.ids[at], X)
         known = pool.known(2)
-        top = rectangle(known if len(known) >= s.enough else X)
+        inner = rectangle(known if len(known) >= s.enough else X)
         for view, rays in ((pair.first, pair.a), (pair.second, pair.b)):
-            seen = on_level(rays[ground.members], view.p, top.z)
-            pool.around.append(seen[np.max(abs(seen - top.centre), axis=1) < s.limits.largest])
-        gap = gaps(top, np.concatenate(pool.around), s.nth)
-        whole = bool((gap < s.ring).all())
-        if whole:
-            top = halfway(top, gap)
-        longer, shorter = sorted((2.0 * top.half).tolist(), reverse=True)
-        point = WayPoint(
-            pair.second.t, np.array([*top.centre, top.z]), height, (longer, shorter), plane.normal, len(known)
-        )
-        refusal = Refusal.TOO_FEW if len(known) < s.enough else self._refusal(pair, pool, plane, top, point)
-        if refusal is None and not whole:
-            refusal = Refusal.NOT_SURROUNDED
+            seen = on_level(rays[ground.members], view.p, inner.z)
+            pool.around.append(seen[np.max(abs(seen - inner.centre), axis=1) < s.limits.largest])
+        pool.notice(pair.ids[foreign(inner, pair, plane.members, s.shrink)])
+        gap = gaps(inner, np.concatenate(pool.around), s.nth)
+        bounded = uncertainty(gap) < s.limits.spread
+        top = halfway(inner, gap) if bounded else inner
+        pool.whole |= in_view(top, pair.second, self.lens, s.border)
+        point = _way_point(pair, plane, top, height, len(known))
+        refusal = self._refusal(pool, plane, point, bounded)
         if refusal is None:
             pool.add(point)
         return Candidate(point, refusal)
@@ -234,14 +235,21 @@ class LandingPlaceDetector:
         self.pools.append(Pool(height))
         return self.pools[-1]
 
-    def _refusal(self, pair: Pair, pool: Pool, plane: Plane, top: Rectangle, point: WayPoint) -> Refusal | None:
-        """Why one way point is not pooled: limits that noise cannot explain, what is out of view or on it."""
+    def _refusal(self, pool: Pool, plane: Plane, point: WayPoint, bounded: bool) -> Refusal | None:
+        """Why one way point is not pooled."""
         s = self.settings
+        if point.features < s.enough:
+            return Refusal.TOO_FEW
         unfit = outside(point.height, *point.size, plane.tilt, s.limits.widened(s.doubt))
         if unfit is not None:
             return unfit
-        pool.whole |= in_view(top, pair.second, self.lens, s.border)
         if not pool.whole:
             return Refusal.NOT_IN_VIEW
-        over = foreign(top, pair, plane.members, s.shrink) > max(s.foreign, s.foreign_share * point.features)
-        return Refusal.CLUTTER if over else None
+        if pool.strangers > max(s.foreign, s.foreign_share * point.features):
+            return Refusal.CLUTTER
+        return None if bounded else Refusal.NOT_SURROUNDED
+
+
+def _way_point(pair: Pair, plane: Plane, top: Rectangle, height: float, features: int) -> WayPoint:
+    shorter, longer = sorted((2.0 * top.half).tolist())
+    return WayPoint(pair.second.t, np.array([*top.centre, top.z]), height, (longer, shorter), plane.normal, features)

@@ -29,7 +29,7 @@ class Refusal(StrEnum):
     TILTED = "tilted"
     CLUTTER = "something on it, or the ground seen through it"
     NOT_IN_VIEW = "never yet wholly in view"
-    NOT_SURROUNDED = "no ground seen beside one of its sides: it may go on there"
+    NOT_SURROUNDED = "no ground seen next to one of its sides: it may go on there"
     TOO_NEW = "not seen often enough"
     UNSTEADY = "its place varies too much"
 
@@ -82,6 +82,7 @@ class Pool:
     keep: int = 16
     points: deque[WayPoint] = field(default_factory=deque)
     seen: dict[int, tuple[int, Array]] = field(default_factory=dict)  # id: how often, sum of places (3,) [m]
+    strange: dict[int, int] = field(default_factory=dict)  # id of what is seen on it but is not of its plane: how often
     whole: bool = False  # all of it has been in view at once
     around: deque[Array] = field(
         default_factory=lambda: deque(maxlen=LOOKS)
@@ -92,6 +93,16 @@ class Pool:
         for name, place in zip(ids.tolist(), X):
             count, total = self.seen.get(name, (0, 0.0))
             self.seen[name] = count + 1, total + place
+
+    def notice(self, ids: np.ndarray) -> None:
+        """Features ids (n,) are seen on it, but lie elsewhere."""
+        for name in ids.tolist():
+            self.strange[name] = self.strange.get(name, 0) + 1
+
+    @property
+    def strangers(self) -> int:
+        """How many features are more often found off it than on it, twice at least."""
+        return sum(count > max(1, self.seen.get(name, (0, None))[0]) for name, count in self.strange.items())
 
     def known(self, times: int) -> Array:
         """(n, 3) [m] mean places of the features found on it so many times or more."""

@@ -67,10 +67,10 @@ def in_view(top: Rectangle, view: View, lens: Fisheye, margin: float) -> bool:
     return bool(lens.inside(lens.project((top.corners() - view.p) @ view.R_CR.T), margin).all())
 
 
-def foreign(top: Rectangle, pair: Pair, members: np.ndarray, shrink: float) -> int:
-    """How many features are seen inside the rectangle, less `shrink` [m] on each side, that are not on its plane."""
+def foreign(top: Rectangle, pair: Pair, members: np.ndarray, shrink: float) -> np.ndarray:
+    """Indices of the features seen inside the rectangle, less `shrink` [m] on each side, that are not on its plane."""
     own = top.own(on_level(pair.b, pair.second.p, top.z))
-    return int(((abs(own) < top.half - shrink).all(axis=1) & ~members).sum())
+    return np.flatnonzero((abs(own) < top.half - shrink).all(axis=1) & ~members)
 
 
 def gaps(top: Rectangle, ground: Array, nth: int) -> Array:
@@ -94,3 +94,8 @@ def halfway(top: Rectangle, gap: Array) -> Rectangle:
     """The rectangle with each side moved outwards by half its gap (2, 2) [m]."""
     shift = 0.25 * (gap[:, 1] - gap[:, 0])
     return Rectangle(top.centre + shift @ top.u, top.half + 0.25 * gap.sum(axis=1), top.u, top.z)
+
+
+def uncertainty(gap: Array) -> float:
+    """[m] standard deviation of the middle along the worse axis if each side may be anywhere in its gap (2, 2) [m]."""
+    return float(np.hypot(gap[:, 0], gap[:, 1]).max()) / math.sqrt(48.0)
