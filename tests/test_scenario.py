@@ -56,7 +56,7 @@ def test_shipped_scenarios_load_and_name_their_schema(name: str) -> None:
 
 
 def test_what_is_shipped() -> None:
-    names = ("calm", "gibert", "gust", "gust_light", "gust_moderate", "headwind", "tailwind")
+    names = ("calm", "gibert", "gust", "gust_light", "gust_moderate", "headwind", "inertial_off", "tailwind")
     assert set(names) == {n.removeprefix("do128/") for n in paths.scenario_names() if n.startswith("do128/")}
     assert {"transport/gibert_far", "transport/gibert_near", "transport/ekf"} <= set(paths.scenario_names())
     gust = scenario.load("do128/gust").wind

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +17,6 @@ from landing_sim.record.log import FlightLog
 from landing_sim.record.stage import TIMELINE, TRUE_COLOUR, rerun
 from landing_sim.signals import Step
 from landing_sim.types import Array
-
-if TYPE_CHECKING:
-    import rerun as rr
 
 COLOURS = ((255, 99, 71), (255, 215, 0), (64, 224, 208), (238, 130, 238))
 LOWEST = 20.0  # [m] of the cg: flows below run off every scale
@@ -70,7 +67,7 @@ def entities(log: FlightLog) -> list[int]:
     return [k for k in range(1, 9) if f"meas_flow_{k}_radps" in log]
 
 
-def record_sights(stream: rr.RecordingStream, log: FlightLog) -> None:
+def record_sights(stream: Any, log: FlightLog) -> None:
     """Lines of sight on the ground and signals, into an open recording; nothing of a flight without such sensors."""
     known = entities(log)
     if not known:
@@ -101,10 +98,8 @@ def record_sights(stream: rr.RecordingStream, log: FlightLog) -> None:
                 stream.send_columns(f"{name}/{word}", times, rr.Scalars.columns(scalars=values[some]))
 
 
-def views(angles: Sequence[float]) -> Any:
-    """A tab of the blueprint: a plot a sensor, looking at angles (n,) [rad]."""
-    import rerun.blueprint as rrb
-
+def views(rrb: Any, angles: Sequence[float]) -> Any:
+    """A tab of the blueprint, made with the package `rrb`: a plot a sensor, looking at angles (n,) [rad]."""
     plots = (
         rrb.TimeSeriesView(origin=f"flow/{k}", name=f"sensor {math.degrees(a):.0f}° down: flow [°/s]")
         for k, a in enumerate(angles, 1)

@@ -129,7 +129,7 @@ def blueprint(scene: Scene) -> Any:
                 errors,
                 flight,
                 phases,
-                *([sights.views(scene.looks)] if scene.looks else []),
+                *([sights.views(rrb, scene.looks)] if scene.looks else []),
                 active_tab=0,
             ),
             row_shares=[3, 2],
