@@ -126,7 +126,9 @@ def design(settings: ControlSettings, models: Sequence[LinearModel]) -> Design:
 
 
 def _point(settings: ControlSettings, model: LinearModel) -> PointDesign:
-    elevator, aileron, rudder = (a.lag_s + a.smoothing_s for a in (settings.elevator, settings.aileron, settings.rudder))
+    elevator, aileron, rudder = (
+        a.lag_s + a.smoothing_s for a in (settings.elevator, settings.aileron, settings.rudder)
+    )
     lags = (elevator, settings.thrust.lag_s, aileron, rudder)
     A, B = longitudinal_model(model)
     longitudinal = _axis(settings.longitudinal, A, B, LONGITUDINAL, INPUTS[:2], settings.loop_delay_s, lags[:2])

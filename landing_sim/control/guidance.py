@@ -14,7 +14,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from landing_sim.control.believed import Believed, Motion, believed, motion
+from landing_sim.control.believed import Believed, Motion, moving
 from landing_sim.control.settings import GearSettings, GuidanceSettings, PathSettings
 from landing_sim.signals import Estimate, Reference
 
@@ -164,8 +164,7 @@ class LandingGuidance:
                 0.0,
                 extra={"blind": 1.0},
             )
-        b = believed(estimate)
-        m = motion(b)
+        b, m = moving(estimate)
         wheels = self._lowest_wheel(b, self.settings.gear)
         mode, waiting = self._phase(memory, estimate, b, m, wheels)
         dt = min(max(estimate.t - memory.t, 0.0), 1.0)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from landing_sim.control.believed import Believed, Motion, believed, motion
+from landing_sim.control.believed import Believed, Motion, moving
 from landing_sim.control.design import Design, PointDesign
 from landing_sim.control.pointing import look_along
 from landing_sim.control.rollout import Rollout, RolloutMemory
@@ -83,8 +83,7 @@ class LandingController:
             return ControlMemory(estimate.t, "acquire", elevator=elevator), Command(
                 elevator, 0.0, 0.0, throttle, self._flaps[0], 0.0, 0.0, *self._look
             )
-        b = believed(estimate)
-        m = motion(b)
+        b, m = moving(estimate)
         pan, tilt = look_along(b.phi, b.theta, b.psi, 0.0, elevation)
         dt = min(max(estimate.t - memory.t, 0.0), 0.5)
         if reference.mode == "rollout" or reference.mode == "stopped":

@@ -133,7 +133,7 @@ def _into_image(ends: Array, k: Intrinsics) -> tuple[Array, np.ndarray]:
     with np.errstate(divide="ignore", invalid="ignore"):
         cut = a + ((NEAR - a[..., 2]) / (b[..., 2] - a[..., 2]))[..., None] * (b - a)
         seen = np.where(behind[..., None], cut[..., None, :], ends)
-        return np.array([k.cx, k.cy]) + k.f * seen[..., :2] / seen[..., 2:], ~behind.all(axis=-1)
+        return np.array([k.cx, k.cy]) + k.f * seen[..., :2] / seen[..., 2:], ~(behind[..., 0] & behind[..., 1])
 
 
 def _across_image(l: Array, k: Intrinsics) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
@@ -13,7 +12,7 @@ from landing_sim.signals import CameraSample, EdgeSet, Estimate, Measurement, Sa
 from landing_sim.types import Array
 from landing_sim.vision.acquisition import Acquisition, AcquisitionConfig
 from landing_sim.vision.believed import BelievedCamera, RunwayMap
-from landing_sim.vision.prediction import PAN, SIGHT, TILT, WIDTH
+from landing_sim.vision.prediction import PAN, SIGHT, TILT, sight_from
 from landing_sim.vision.windows import EdgeConfig, Scheme, SearchConfig, WindowPlanner
 
 
@@ -45,7 +44,8 @@ class RunwayFrontEnd:
     """
 
     __slots__ = (
-        "_acquisition", "_counts", "_encoder", "_names", "_planner", "_sight_of", "_unknown", "_width", "reason", "sensor",
+        "_acquisition", "_counts", "_encoder", "_names", "_planner", "_sight_of", "_unknown", "_unsaid", "_width", "reason",
+        "sensor",
     )  # fmt: skip
 
     def __init__(self, runway: RunwayMap, camera: BelievedCamera, config: FrontEndConfig | None = None) -> None:
@@ -59,7 +59,8 @@ class RunwayFrontEnd:
         self._width = runway.width
         self._unknown: Array = np.diag([10.0, 2.0, 1.0, 0.01, 0.01, 0.01, 0.0, 0.0, 0.0]) ** 2  # without covariance
         self._names: tuple[str, ...] = ()
-        self._sight_of: Array = np.empty((9, 0))
+        self._sight_of: tuple[np.ndarray, Array] = np.empty((0, 2), np.int64), np.empty(0)
+        self._unsaid: Array = np.empty((0, 0))  # in place of a covariance that the estimate does not have
 
     def process(self, sample: Sample, estimate: Callable[[], Estimate]) -> tuple[Measurement, ...]:
         """`estimate` answers for sample.t_valid.
@@ -77,23 +78,19 @@ class RunwayFrontEnd:
             return (Measurement("pose", sample.t_valid, sample.t_arrival, got.z, got.R),)
         if believed.names is not self._names:
             self._names, self._sight_of = believed.names, sight_of(believed.names)
-        T = self._sight_of
-        sight = T @ believed.mean
-        sight[PAN] += pan
-        sight[TILT] += tilt
-        if sight[WIDTH] == 0.0:  # not among what is estimated
-            sight[WIDTH] = self._width
-        if not math.isfinite(sight.sum()):
+            self._unsaid = np.zeros((len(believed.names), len(believed.names)))
+        P = self._unsaid if believed.cov is None else believed.cov
+        sight, cov, finite = sight_from(*self._sight_of, believed.mean, P, pan, tilt, self._width)
+        if not finite:
             raise ValueError(f"camera front end: the estimate at t = {believed.t} s is not finite: {sight.tolist()}")
-        cov = self._unknown if believed.cov is None else T @ believed.cov @ T.T
-        w = self._planner.place(sight, cov, self._counts)
+        w = self._planner.place(sight, self._unknown if believed.cov is None else cov, self._counts)
         z, variance, _, status = self._planner.measure(data.frame, w)
         edges = EdgeSet(w.feature, w.centre, w.direction, status, pan, tilt)
         return (Measurement("edges", sample.t_valid, sample.t_arrival, z, variance, edges),)
 
 
-def sight_of(names: tuple[str, ...]) -> Array:
-    """(9, n) that maps an estimate's states to the sight, less the platform angles read.
+def sight_of(names: tuple[str, ...]) -> tuple[np.ndarray, Array]:
+    """Entries and signs that make an estimate's states the sight, less the platform angles read: see `sight_from`.
 
     What is read is the true angle plus bias ("epan", "etilt") plus noise ("jpan", "jtilt"), if these are estimated.
     Raises ValueError if one of x, y, H, phi, theta, psi is not among the names.
@@ -103,11 +100,7 @@ def sight_of(names: tuple[str, ...]) -> Array:
         raise ValueError(
             f"camera front end: the estimate lacks {', '.join(missing)}; it needs {', '.join(SIGHT[:PAN])}"
         )
-    T = np.zeros((len(SIGHT), len(names)))
-    for row, name in enumerate(SIGHT):
-        if name in names:
-            T[row, names.index(name)] = 1.0
-    for row, name in ((PAN, "epan"), (PAN, "jpan"), (TILT, "etilt"), (TILT, "jtilt")):
-        if name in names:
-            T[row, names.index(name)] = -1.0
-    return T
+    errors = ((PAN, "epan"), (PAN, "jpan"), (TILT, "etilt"), (TILT, "jtilt"))
+    told = [(row, name, 1.0) for row, name in enumerate(SIGHT)] + [(row, name, -1.0) for row, name in errors]
+    known = [(row, names.index(name), sign) for row, name, sign in told if name in names]
+    return np.array([entry[:2] for entry in known], np.int64), np.array([sign for _, _, sign in known])

@@ -58,6 +58,32 @@ def camera_pose(sight: Array, lever: Array) -> tuple[Array, Array]:
 
 
 @kernel
+def sight_from(
+    entries: np.ndarray, signs: Array, mean: Array, cov: Array, pan: float, tilt: float, width: float
+) -> tuple[Array, Array, bool]:
+    """Sight (9,) and its covariance (9, 9), and whether the sight is finite.
+
+    entries (m, 2), signs (m,): which element of the sight has which state in it, and whether it is added or taken off;
+    mean (n,), cov (n, n) of the states; pan, tilt [rad] as read; width [m] where no state is one.
+    """
+    sight, across, spread = np.zeros(9), np.zeros((9, len(mean))), np.zeros((9, 9))
+    for m in range(len(signs)):
+        i, k = entries[m, 0], entries[m, 1]
+        sight[i] += signs[m] * mean[k]
+        for j in range(len(mean)):
+            across[i, j] += signs[m] * cov[k, j]
+    for m in range(len(signs)):
+        i, k = entries[m, 0], entries[m, 1]
+        for j in range(9):
+            spread[j, i] += signs[m] * across[j, k]
+    sight[PAN] += pan
+    sight[TILT] += tilt
+    if sight[WIDTH] == 0.0:
+        sight[WIDTH] = width
+    return sight, spread, math.isfinite(sight.sum())
+
+
+@kernel
 def feature_line(
     feature: int, p_RC: Array, R_CR: Array, lens: Array, width: float, slope: float, u: float, v: float
 ) -> Vector:
