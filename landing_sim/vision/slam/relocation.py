@@ -19,19 +19,24 @@ from landing_sim.vision.slam.pose import Pose, turned
 from landing_sim.vision.slam.settings import SlamSettings
 from landing_sim.vision.slam.tracking import Tracked, track
 
-CANDIDATES = 3
+CANDIDATES = 5
 ASKED = 0.5  # of the points looked for must be found: a wrong place finds few
 LEAST = 40  # points
 
 
-def relocate(chart: Map, levels: Pyramid, R_CR: Array, settings: SlamSettings, p_said: Array | None) -> Tracked | None:
+def relocate(
+    chart: Map, levels: Pyramid, R_CR: Array, settings: SlamSettings, p_said: Array | None, height: float | None = None
+) -> Tracked | None:
     """The pose of a frame that could be anywhere on the map, or None.
 
-    R_CR (3, 3) : attitude from the inertial unit; p_said (3,) [m] : where else the camera may be, tried first
+    R_CR (3, 3) : attitude from the inertial unit; p_said (3,) [m] : where else the camera may be, tried first;
+    height [m] : of the camera, where the sonar tells it
     """
     places = [] if p_said is None else [p_said]
     places += [chart.p[k] for k in alike(chart, levels, R_CR)]
     for place in places:
+        if height is not None and place is not p_said:
+            place = np.array([place[0], place[1], -height])
         step = 0.5 * settings.keyframe_distance * max(0.1, -place[2])
         for dx, dy in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)):
             start = Pose(R_CR, place + step * np.array([dx, dy, 0.0]))

@@ -82,13 +82,16 @@ class Slam:
         self._last: Pose | None = None
         self._last_t, self._velocity = -math.inf, np.zeros(3)
         self._R_last = np.eye(3)  # R_CR that the inertial unit told with _last
+        self._heard = -math.inf, math.nan  # the latest reading
         self._sonar: list[tuple[float, float]] = []
         self._sonar_path: list[tuple[float, Array]] = []  # of the sonar in the map, until the scale is frozen
 
     def sonar(self, t: float, height: float) -> None:
-        """A reading [m] of the height above the ground, taken at t [s]. Needed until the scale is frozen."""
-        if not self.chart.metric and math.isfinite(height):
-            self._sonar.append((t, height))
+        """A reading [m] of the height above the ground, taken at t [s]. Needed until the scale is frozen, useful when lost."""
+        if math.isfinite(height):
+            self._heard = t, height
+            if not self.chart.metric:
+                self._sonar.append((t, height))
 
     def image(self, t: float, image: np.ndarray, euler: Array, p_said: Array | None = None) -> Located | None:
         """Where the image (h, w) uint8, exposed at t [s], was taken; None if that is not known: `reason` says why.
@@ -183,7 +186,8 @@ class Slam:
             if p_said is not None and np.isfinite(p_said).all():
                 there = p_said + R_said.T @ self.rig.R_CB @ self.rig.p_BC
             R = R_said if self._last is None else R_said @ self._R_last.T @ self._last.R_CR
-            seen = relocate(self.chart, levels, R, s, there)
+            heard = self._heard[1] if abs(t - self._heard[0]) < GAP else None
+            seen = relocate(self.chart, levels, R, s, there, heard)
         if seen is not None:
             if self.status == "lost":
                 self._last = None  # no rate of change across the gap
