@@ -129,7 +129,7 @@ CAMPAIGNS: dict[str, Campaign] = {
     "unknown_far": Campaign("transport/gibert_far", UNKNOWN, range(1, 31)),
     "unknown_near": Campaign("transport/gibert_near", UNKNOWN, range(1, 31)),
     "unknown_ekf": Campaign("transport/ekf", UNKNOWN, range(1, 31)),
-    **{f"unknown_{name}": Campaign("transport/gibert_far", UNKNOWN, range(1, 13), changes)
+    **{f"unknown_{name}": Campaign("transport/gibert_far", UNKNOWN, range(1, 31), changes)
        for name, changes in EFFECTS.items()},
     "intercept_far": Campaign("transport/gibert_far", INTERCEPT, range(1, 11), STILL),
     "intercept_near": Campaign("transport/gibert_near", INTERCEPT, range(1, 11), STILL),
