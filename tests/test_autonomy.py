@@ -148,6 +148,11 @@ def test_a_gust_starts_the_hold_anew() -> None:
     assert hovering == pytest.approx(2.2 + S.hold, abs=0.21)
 
 
+def test_steadiness_of_one_phase_does_not_count_in_the_next() -> None:
+    m = Autonomy().decide(in_mode("take_off", steady=1.0), seen(10.0, x=0.5, H=1.0))
+    assert m.mode == "hover" and math.isnan(m.steady)
+
+
 def test_the_place_moves_with_new_way_points_until_the_descent() -> None:
     autonomy = Autonomy()
     m = autonomy.decide(in_mode("hover_above"), seen(10.0, platform=True, lx=1.3, ly=0.0, x=0.5, H=1.0))

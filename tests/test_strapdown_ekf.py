@@ -177,6 +177,17 @@ def test_without_a_reading_the_last_one_holds_and_is_made_good_later() -> None:
     assert ekf.read(memory)["vx"] == pytest.approx(1.0)
 
 
+def test_a_fix_between_two_readings_splits_the_interval() -> None:
+    """1 m/s^2 for 1 s, the readings at 0 and 1 s, a fix at 0.5 s where it is then: 0.125 m."""
+    ekf = StrapdownEkf()
+    memory = ekf.update(ekf.init(0.0), fix(0.0, [0.0, 0.0, 0.0]))
+    memory = ekf.update(memory, reading(0.0, STILL + [1.0, 0.0, 0.0]))
+    memory = ekf.update(ekf.predict(memory, Command(), 0.5), fix(0.5, [0.125, 0.0, 0.0]))
+    memory = ekf.update(ekf.predict(memory, Command(), 1.0), reading(1.0, STILL + [1.0, 0.0, 0.0]))
+    estimate = ekf.read(memory)
+    assert estimate["x"] == pytest.approx(0.5) and estimate["vx"] == pytest.approx(1.0)
+
+
 def test_way_point_is_kept_and_read_as_a_height() -> None:
     for estimator in (StrapdownEkf(), LastFix()):
         memory = estimator.init(0.0)

@@ -203,7 +203,7 @@ def moved(p: Vector, v: Vector, target: Vector, speed: float, acceleration: floa
     far = math.sqrt(gap[0] ** 2 + gap[1] ** 2 + gap[2] ** 2)
     step = acceleration * dt
     # so fast that it stops in time: from v, one step of dt, then braking
-    fastest = min(speed, far / dt, math.sqrt(2.0 * acceleration * far + 0.25 * step * step) - 0.5 * step)
+    fastest = min(speed, math.sqrt(2.0 * acceleration * far + 0.25 * step * step) - 0.5 * step)
     scale = fastest / far if far > 0.0 else 0.0
     change = [scale * g - w for g, w in zip(gap, v)]
     size = math.sqrt(sum(c * c for c in change))

@@ -78,10 +78,8 @@ class LastFix:
         dt = measurement.t_valid - memory.taken
         if dt <= EPS:
             return memory
-        v = _NOTHING
-        if math.isfinite(dt):
-            share = 1.0 if self.config.smoothing == 0.0 else -math.expm1(-dt / self.config.smoothing)
-            v = memory.v + share * ((z - memory.p) / dt - memory.v)
+        share = 1.0 if self.config.smoothing == 0.0 else -math.expm1(-dt / self.config.smoothing)
+        v = memory.v + share * ((z - memory.p) / dt - memory.v)  # 0 at the first fix: dt is infinite
         return memory._replace(p=z, v=v, taken=measurement.t_valid, arrived=measurement.t_arrival)
 
     def read(self, memory: Memory, t: float | None = None) -> Estimate:
