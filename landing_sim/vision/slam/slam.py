@@ -87,7 +87,7 @@ class Slam:
         self._sonar_path: list[tuple[float, Array]] = []  # of the sonar in the map, until the scale is frozen
 
     def sonar(self, t: float, height: float) -> None:
-        """A reading [m] of the height above the ground, taken at t [s]. Needed until the scale is frozen, useful when lost."""
+        """A reading [m] of the height above the ground at t [s]: needed until the scale is frozen, useful when lost."""
         if math.isfinite(height):
             self._heard = t, height
             if not self.chart.metric:
@@ -118,7 +118,7 @@ class Slam:
             seen = self._track(t, R_said, levels, p_said)
         if seen is None:
             return None
-        if self.mode != "localise" and self.status == "tracking":
+        if self.mode != "localise" and self._last is not None:  # a place just found again is not built on yet
             seen = self._map(t, euler, levels, seen)
         self._remember(t, R_said, seen.pose)
         self.located = self._locate(t, seen)
@@ -255,7 +255,9 @@ class Slam:
         growth.adjust_all(chart)
         t = np.array([at for at, _ in self._sonar_path])
         path = np.array([p for _, p in self._sonar_path])
-        said = np.array([(at, height) for at, height in self._sonar if t[0] <= at <= t[-1]]).reshape(-1, 2)
+        said = np.array([(at, height) for at, height in self._sonar if t[0] <= at < t[-1]]).reshape(-1, 2)
+        k = np.searchsorted(t, said[:, 0], side="right")
+        said = said[t[k] - t[k - 1] < GAP]  # else the camera was lost between
         below = np.column_stack([np.interp(said[:, 0], t, path[:, axis]) for axis in range(3)])
         found = scale.similarity(chart.X, self._anchor, below, said[:, 1], s, self._grown < 2 * s.scale_frames)
         if isinstance(found, str):
