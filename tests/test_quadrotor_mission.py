@@ -14,6 +14,7 @@ import pytest
 from landing_sim import scenario as scenarios
 from landing_sim.campaign import figures, landing
 from landing_sim.campaign.file import load as load_campaign
+from landing_sim.control.autonomy import Autonomy, AutonomySettings
 from landing_sim.errors import ScenarioError
 from landing_sim.estimators.readings import Reading
 from landing_sim.missions import quadrotor_eyes as eyes
@@ -165,8 +166,10 @@ def test_standing_ends_with_the_take_off() -> None:
 
     assert heard(0.12) == ["sonar", "position"] == heard(0.12) and heard(0.15) == ["sonar"]
     assert heard(0.12) == ["sonar", "position"] and heard(0.25) == ["sonar"] == heard(0.12)
-    kept = eyes.OnlyLooking(inner)
-    assert kept.sensor == "sonar" and kept.process(Sample("sonar", 1.0, 1.0, 0.3), lambda: NO_ESTIMATE) == ()
+    for passed in (True, False):
+        some = eyes.While(inner, lambda passed=passed: passed)
+        assert some.sensor == "sonar"
+        assert len(some.process(Sample("sonar", 1.0, 1.0, 0.3), lambda: NO_ESTIMATE)) == passed
 
 
 def test_a_tour_visits_its_points() -> None:
@@ -181,6 +184,23 @@ def test_a_tour_visits_its_points() -> None:
         visited.add((wanted.extra["x"], wanted.y, -wanted.height))
         t += 0.01
     assert set(points[:3]) <= visited and wanted.mode == "done"
+
+
+def test_flown_by_hand_until_the_map_is_there() -> None:
+    ready = [False]
+    settings = AutonomySettings(hold=0.0, traverse=0.5)
+    led = eyes.HandFlown(eyes.Tour(((0.0, 0.0, -1.0), (2.0, 0.0, -1.0))), Autonomy(settings), lambda: ready[0])
+    memory, modes, at = led.init(), [], 0.0
+    for k in range(1000):
+        ready[0] = k >= 300
+        here = np.array([at, 0.0, 1.0, 0.0, 0.0, 0.0, math.nan, math.nan, math.nan])
+        names = ("x", "y", "H", "vx", "vy", "vz", "lx", "ly", "lH")
+        told = Estimate(0.01 * k, names, here, None, True, {"localised": True, "platform": False})
+        memory, wanted = led.step(memory, told)
+        assert abs(wanted.extra["x"] - at) < 0.01 and wanted.height == 1.0  # no jump where it is let go
+        at = wanted.extra["x"]
+        modes.append(wanted.mode)
+    assert [mode for mode, _ in itertools.groupby(modes)] == ["survey", "hover", "traverse"] and modes[299] == "survey"
 
 
 def test_a_place_is_told_once_it_was_seen_whole() -> None:
@@ -250,6 +270,7 @@ WRONG = {
     "task: hover\ncamera: {period_s: 0.075}\n": r"s.yaml:4:20: camera.period_s: 0.075 is not a whole multiple",
     "task: hover\ntime: {cycle_s: 0.02}\n": r"time.cycle_s: is not a whole part of the inertial unit's period of 0.01 s",
     "task: hover\ncamera: {latency: {spike_low_s: 0.5}}\n": r"camera.latency.spike_low_s: is above spike_high_s = 0.25",
+    "task: hover\nlocalisation: {survey: false, map: m}\n": r"localisation.map: without a survey the map is made in flight",
     "task: hover\ncamera: {lens: wide}\n": r"s.yaml:4:10: camera.lens: unknown key",
     "scene: {boxes: [{x_m: 1, slope_x_deg: 40}]}\n": r"scene.boxes.0.height_m: at this slope its top dips below",
     "task: hover\nfaults: [{sensor: camara, kind: 'off'}]\n": r"faults.0.sensor: no sensor 'camara' here.*mean 'camera'",

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from landing_sim import loop
+from landing_sim.control import autonomy
 from landing_sim.control.autonomy import moved
 from landing_sim.control.position import PositionController
 from landing_sim.estimators.readings import Reading, StrapdownFrontEnd
@@ -114,15 +115,15 @@ class Looking:
         return (*out, Measurement("way_point", sample.t_valid, sample.t_arrival, place.p_R, variance))
 
 
-class OnlyLooking:
-    """interfaces.FrontEnd: what `inner` makes of its samples is kept from the estimator."""
+class While:
+    """interfaces.FrontEnd: what `inner` makes of its samples is passed on only while `so` says."""
 
-    def __init__(self, inner: FrontEnd) -> None:
-        self.sensor, self._inner = inner.sensor, inner
+    def __init__(self, inner: FrontEnd, so: Callable[[], bool]) -> None:
+        self.sensor, self.inner, self._so = inner.sensor, inner, so
 
     def process(self, sample: Sample, estimate: Callable[[], Estimate]) -> tuple[Measurement, ...]:
-        self._inner.process(sample, estimate)
-        return ()
+        out = self.inner.process(sample, estimate)
+        return out if self._so() else ()
 
 
 # ------------------------------------------------------------------------------------------------- the survey
@@ -183,6 +184,36 @@ def tour(s: QuadrotorScenario, boxes: tuple[Box, ...]) -> tuple[Vector, ...]:
     return tuple(points)
 
 
+class HandFlownMemory(NamedTuple):
+    """The tour's memory until the vehicle is let go, then the autonomy's."""
+
+    by_hand: TourMemory | None
+    alone: autonomy.Memory
+
+
+@dataclass(frozen=True, slots=True)
+class HandFlown:
+    """interfaces.Guidance: flown by hand along the tour until `ready` says so, then let go: from a hover on."""
+
+    tour: Tour
+    autonomy: autonomy.Autonomy
+    ready: Callable[[], bool]
+
+    def init(self) -> HandFlownMemory:
+        return HandFlownMemory(self.tour.init(), self.autonomy.init())
+
+    def step(self, m: HandFlownMemory, estimate: Estimate) -> tuple[HandFlownMemory, Reference]:
+        if m.by_hand is not None and self.ready():
+            over = (0.0, 0.0, -self.autonomy.settings.height)
+            t, p, v = estimate.t, m.by_hand.p, m.by_hand.v
+            m = HandFlownMemory(None, m.alone._replace(mode="hover", t=t, since=t, p=p, v=v, target=over))
+        if m.by_hand is None:
+            memory, reference = self.autonomy.step(m.alone, estimate)
+            return m._replace(alone=memory), reference
+        by_hand, reference = self.tour.step(m.by_hand, estimate)
+        return m._replace(by_hand=by_hand), reference
+
+
 def survey(s: QuadrotorScenario, plant: QuadrotorPlant, boxes: tuple[Box, ...], scene: Scene) -> Map:
     """The map that a flight by hand gives. `plant` hovers where the tour begins. Raises ValueError if it gives none."""
 
@@ -205,7 +236,7 @@ def survey(s: QuadrotorScenario, plant: QuadrotorPlant, boxes: tuple[Box, ...], 
         "imu": StrapdownFrontEnd(),
         "sonar": SonarToSlam(slam),
         "position_fix": Reading("position_fix", "position", 0.01),
-        "camera": OnlyLooking(SlamFrontEnd(slam)),
+        "camera": While(SlamFrontEnd(slam), lambda: False),
     }
     air = Drift(DriftConfig(force=0.05), streams("gust"))
     controller = PositionController(replace(PositionController().settings, bandwidth=2.0, vertical=2.0))

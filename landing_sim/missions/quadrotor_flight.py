@@ -207,7 +207,7 @@ def _measure_landing(found: dict[str, float], flown: log.FlightLog, box: Box) ->
         found["miss_m"] = math.hypot(touch.x - box.x, touch.y - box.y)
         found["sink_rate_mps"] = touch.sink_rate
         found["touchdown_tilt_deg"] = math.degrees(math.hypot(touch.pitch, touch.bank))
-        took_off = np.flatnonzero(flown["mode"] == "take_off")
+        took_off = np.flatnonzero(~np.isin(flown["mode"], ("wait", "survey")))
         if len(took_off):
             found["flight_s"] = touch.t - float(flown["t_s"][took_off[0]])
 

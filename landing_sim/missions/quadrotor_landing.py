@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 from landing_sim import loop, paths
 from landing_sim.control.autonomy import Autonomy, AutonomySettings
@@ -106,8 +107,8 @@ def build(
     s = scenario
     clock = loop.Clock.of(s.time.step_s, s.time.cycle_s, 0.0)
     boxes, _ = surroundings(s)
-    plant = _plant(s, boxes, streams)
-    sensors, front_ends = _eyes(s, plant, boxes, streams)
+    plant = _plant(s, boxes, streams, airborne=not s.localisation.survey)
+    eyes = _eyes(s, plant, boxes, streams)
     fused = s.filter.kind == "fused"
     estimator: Estimator = LastFix() if not fused else StrapdownEkf()
     if fused and s.filter.compensated:
@@ -119,10 +120,10 @@ def build(
             clock,
             plant,
             Drift(air, streams("gust")),
-            with_faults(sensors, s.faults, streams),
-            front_ends,
+            with_faults(eyes.sensors, s.faults, streams),
+            eyes.front_ends,
             estimator,
-            Autonomy(_path(s)),
+            eyes.led(Autonomy(_path(s))),
             PositionController(_gains(s)),
         ),
         boxes,
@@ -164,13 +165,13 @@ def _above(boxes: tuple[Box, ...]) -> Callable[[float, float], float]:
 
 
 def _plant(
-    s: QuadrotorScenario, boxes: tuple[Box, ...], streams: Callable[[str], NoiseStream], start: Start | None = None
+    s: QuadrotorScenario, boxes: tuple[Box, ...], streams: Callable[[str], NoiseStream], airborne: bool = False
 ) -> QuadrotorPlant:
     v = s.vehicle
     firmware = AttitudeConfig(bias=math.radians(v.attitude_bias_deg), wander=math.radians(v.attitude_wander_deg))
     return QuadrotorPlant(
         paths.data_folder("aircraft") / "pelican",
-        start or Start(),
+        Start(height=s.path.height_m if airborne else None),
         _above(boxes),
         s.time.step_s,
         streams("firmware"),
@@ -183,7 +184,7 @@ def _plant(
 
 def _eyes(
     s: QuadrotorScenario, plant: QuadrotorPlant, boxes: tuple[Box, ...], streams: Callable[[str], NoiseStream]
-) -> tuple[list[Sensor], dict[str, FrontEnd]]:
+) -> Eyes:
     """The sensors, and their front ends."""
     late = s.camera.latency
     latency = LatencyConfig(late.mean_s, late.jitter_s, late.spike_share, late.spike_low_s, late.spike_high_s)
@@ -196,11 +197,15 @@ def _eyes(
         if s.localisation.kind == "emulated"
         else _seeing(s, latency, boxes, streams)
     )
-    sensors += more[0]
-    return sensors, {**front_ends, **more[1]}
+    return Eyes([*sensors, *more.sensors], {**front_ends, **more.front_ends}, more.led)
 
 
-Eyes = tuple[list[Sensor], dict[str, FrontEnd]]
+class Eyes(NamedTuple):
+    """Sensors, front ends, and what the autonomy becomes where the flight begins by hand."""
+
+    sensors: list[Sensor]
+    front_ends: dict[str, FrontEnd]
+    led: Callable[[Autonomy], Guidance] = lambda autonomy: autonomy
 
 
 def _emulated(
@@ -216,7 +221,7 @@ def _emulated(
         place = PlaceFixConfig(s.camera.period_s, latency)
         sensors.append(PlaceFix(place, boxes[0].corners(), streams("place_fix"), streams("place_latency")))
         front_ends["place_fix"] = Fresh(Reading("place_fix", "way_point", place.bias), s.filter.horizon_s)
-    return sensors, front_ends
+    return Eyes(sensors, front_ends)
 
 
 def _seeing(
@@ -228,22 +233,36 @@ def _seeing(
     place = scene(s)
 
     def made() -> eyes.Map:
-        by_hand = Start(height=s.path.height_m)
-        plant = _plant(s, boxes, lambda name: Noise(s.scene.seed, f"survey {name}"), by_hand)
+        plant = _plant(s, boxes, lambda name: Noise(s.scene.seed, f"survey {name}"), airborne=True)
         return eyes.survey(s, plant, boxes, place)
 
-    chart = eyes.chart(s, made)
-    slam = eyes.Slam(eyes.rig(s), eyes.settings(s), "both" if s.localisation.mapping else "localise", chart)
+    survey = s.localisation.survey
+    chart = eyes.chart(s, made) if survey else None
+    mode: Literal["map", "localise", "both"] = (
+        "map" if chart is None else "both" if s.localisation.mapping else "localise"
+    )
+    slam = eyes.Slam(eyes.rig(s), eyes.settings(s), mode, chart)
     detector = eyes.LandingPlaceDetector(eyes.lens(s), streams("detector")) if s.task == "land" else None
     localiser = eyes.SlamFrontEnd(slam, s.localisation.noise_m, streams("added"))
+    looking: FrontEnd = eyes.Looking(localiser, detector)
     camera = eyes.FisheyeCamera(
         eyes.renderer(s, place, streams("pixels")), Latency(latency, streams("latency")), s.camera.period_s
     )
+    heard = eyes.SonarToSlam(slam)
+    if survey:
+        return Eyes([camera], {"sonar": eyes.Standing(heard), "camera": Fresh(looking, s.filter.horizon_s)})
+
+    def found() -> bool:
+        return slam.chart.metric
+
+    by_eye = PositionFixConfig(s.camera.period_s, eyes.NOW, wander=0.0, scale=0.0)
     front_ends: dict[str, FrontEnd] = {
-        "sonar": eyes.Standing(eyes.SonarToSlam(slam)),
-        "camera": Fresh(eyes.Looking(localiser, detector), s.filter.horizon_s),
+        "sonar": heard,
+        "camera": Fresh(eyes.While(looking, found), s.filter.horizon_s),
+        "position_fix": eyes.While(Reading("position_fix", "position", 0.01), lambda: not found()),
     }
-    return [camera], front_ends
+    seen_by_hand = PositionFix(by_eye, streams("position_fix"), streams("by hand"))
+    return Eyes([camera, seen_by_hand], front_ends, lambda g: eyes.HandFlown(eyes.Tour(eyes.tour(s, boxes)), g, found))
 
 
 def _path(s: QuadrotorScenario) -> AutonomySettings:

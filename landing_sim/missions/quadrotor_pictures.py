@@ -79,6 +79,7 @@ class Pictures:
 def _looking(mission: Mission) -> eyes.Looking | None:
     front_end = mission.parts.front_ends.get("camera")
     inner = front_end.front_end if isinstance(front_end, Fresh) else front_end
+    inner = inner.inner if isinstance(inner, eyes.While) else inner
     return inner if isinstance(inner, eyes.Looking) else None
 
 

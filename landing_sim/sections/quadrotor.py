@@ -138,7 +138,10 @@ class Localisation(Section):
         max_length=500,
         description="slam: file of its map, made and written if it is not there; null = made each time",
     )
-    mapping: bool = Field(False, description="slam: the map grows in flight")
+    survey: bool = Field(
+        True, description="slam: a flight by hand made the map before; else this one is, until its own map has a scale"
+    )
+    mapping: bool = Field(False, description="slam: the map of the survey grows in flight")
     fast_threshold: int = Field(8, ge=4, le=100, description="slam: grey levels that a corner must stand out by")
     window: int = Field(0, ge=0, le=1000, description="slam: keyframes kept; 0 = all")
     wander_m: NotNegative = Field(0.004, description="emulated: 1 sigma of what wanders within 10 s")
@@ -242,6 +245,11 @@ class QuadrotorScenario(Section):
                     problems.append((where, f"{period:g} is not a whole multiple of {name} = {unit:g}"))
         if late.spike_low_s > late.spike_high_s:
             problems.append((("camera", "latency", "spike_low_s"), f"is above spike_high_s = {late.spike_high_s:g}"))
+        if not self.localisation.survey:
+            if self.localisation.kind != "slam":
+                problems.append((("localisation", "survey"), "only slam makes a map"))
+            if self.localisation.map is not None:
+                problems.append((("localisation", "map"), "without a survey the map is made in flight: leave it out"))
         if self.task == "land" and not self.scene.boxes:
             problems.append((("scene", "boxes"), "task land needs a box to land on"))
         for i, box in enumerate(self.scene.boxes):
