@@ -27,6 +27,7 @@ from landing_sim.estimators.runway_steps import (
     correct_dense,
     correct_ud,
     edges_dense,
+    forward_dense,
     gyro_dense,
     of_index,
     transition,
@@ -87,6 +88,7 @@ class RunwayEkf:
         self._wind = None  # (n, 3) where the covariance has the wind, if turbulence is reported
         if config.turbulence > 0.0:
             self._wind = np.equal.outer(self.blocks.index, states.WIND).astype(float)
+        self._integrated = config.process_noise == "integrated"
         self._prior = self._prior_variance()
         self._gate = math.inf if config.gate_sigma is None else config.gate_sigma**2
 
@@ -108,10 +110,14 @@ class RunwayEkf:
             steady = thrust(command.throttle, memory.airspeed, self._par)
             return memory._replace(t=t, shadow=np.array([*u[:3], command.flap, steady, 0.0]))
         phase = "ground" if memory.on_ground else "start" if memory.frames < self.config.start_frames else "air"
-        x, shadow, Phi, Qd = transition(
+        told = (
             memory.x, memory.shadow, u, self._par, memory.on_ground, dt, self.blocks.index, self.blocks.starts,
-            self._keep, self._q[phase], self._noise_variance, self.config.process_noise == "integrated",
+            self._keep, self._q[phase], self._noise_variance, self._integrated,
         )  # fmt: skip
+        if memory.D is None and self._wind is None:
+            x, shadow, P = forward_dense(memory.P, *told)
+            return memory._replace(t=t, x=x, shadow=shadow, P=P)
+        x, shadow, Phi, Qd = transition(*told)
         if self._wind is not None and not memory.on_ground:
             changes = change(x[states.H] - self._slope * x[states.X], self.config.turbulence, memory.airspeed, dt)
             Qd = Qd + np.diag(self._wind @ changes)

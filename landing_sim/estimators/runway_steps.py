@@ -12,7 +12,14 @@ import numpy as np
 from landing_sim.estimators.aircraft_model import propagate
 from landing_sim.estimators.edge_model import edge_model
 from landing_sim.estimators.inertial_model import airspeed_model, gyro_model
-from landing_sim.estimators.kalman import expand, innovation_variance, integrated_noise, update_dense, update_ud
+from landing_sim.estimators.kalman import (
+    expand,
+    innovation_variance,
+    integrated_noise,
+    predict_dense,
+    update_dense,
+    update_ud,
+)
 from landing_sim.estimators.states import DRIVING, JPAN, JTILT, N
 from landing_sim.geometry.runway_image import THRESHOLD
 from landing_sim.jit import kernel
@@ -40,6 +47,16 @@ def transition(
     for i in range(len(q)):
         Qd[i, i] += added[i] if integrated else q[i] * dt + added[i]
     return x, shadow, Phi, Qd
+
+
+@kernel
+def forward_dense(
+    P: Array, x: Array, shadow: Array, u: Array, par: Array, on_ground: bool, dt: float, index: np.ndarray,
+    starts: np.ndarray, keep: Array, q: Array, added: Array, integrated: bool,
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """`transition` and `predict_dense` in one: x, shadow, P after dt."""
+    x, shadow, Phi, Qd = transition(x, shadow, u, par, on_ground, dt, index, starts, keep, q, added, integrated)
+    return x, shadow, predict_dense(P, Phi, Qd, starts)
 
 
 @kernel
