@@ -98,6 +98,8 @@ def _eyes(scenario: Scenario) -> dict[str, FrontEnd]:
             math.radians(s.fastest_dps),
             s.lowest_m,
             _passage(scenario),
+            (RECEPTORS - 1) * math.radians(s.spacing_deg),
+            math.radians(s.unsteady_dps3),
         )
         for i, angle in enumerate(s.angles_deg)
     }

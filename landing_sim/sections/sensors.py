@@ -90,6 +90,9 @@ class OpticFlow(Section):
     lowest_m: NotNegative = Field(30.0, description="believed height of the cg below which flow is invalid")
     floor_dps: Positive = Field(0.1, description="a flow's sigma, as believed, is this")
     share: NotNegative = Field(0.02, description="and this share of it")
+    unsteady_dps3: NotNegative = Field(
+        10.0, description="and what its change within an edge's passage, so curved (rms), makes the mean differ by"
+    )
 
 
 class Sensors(Section):

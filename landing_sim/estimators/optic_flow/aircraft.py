@@ -65,7 +65,9 @@ class FieldFlowFrontEnd:
     A flow is invalid, and not passed on, where it is slower or faster than the row can time, where the ground is nearer
     than `lowest` [m] (there the runway's edges say more), and where its edge was longer under way than is kept.
 
-    floor [rad/s], share : one sigma of a reading is floor + share |omega|; oldest [s] of the middle of its passage
+    floor [rad/s], share : one sigma of a reading is floor + share |omega|, and besides, for it is a mean over the time T of
+        a passage, unsteady T^2 / 24, with unsteady [rad/s^3] the flow's second derivative (rms)
+    row : [rad] from the first to the last receptor; oldest [s] of the middle of a passage
     """
 
     sensor: str
@@ -76,6 +78,8 @@ class FieldFlowFrontEnd:
     fastest: float
     lowest: float
     oldest: float
+    row: float = 0.0
+    unsteady: float = 0.0
 
     def process(self, sample: Sample, estimate: Callable[[], Estimate]) -> tuple[Measurement, ...]:
         if not sample.data.flows:
@@ -86,7 +90,8 @@ class FieldFlowFrontEnd:
         out = []
         for seen, t in zip(sample.data.flows, sample.data.times):
             if self.slowest <= abs(seen) <= self.fastest and sample.t_arrival - t <= self.oldest:
-                sigma = self.floor + self.share * abs(seen)
+                passage = self.row / abs(seen)
+                sigma = math.hypot(self.floor + self.share * abs(seen), self.unsteady * passage * passage / 24.0)
                 z, R = np.array([self.alpha, seen]), np.array([0.0, sigma * sigma])
                 out.append(Measurement("flow", t, sample.t_arrival, z, R))
         return tuple(out)
