@@ -136,6 +136,7 @@ def distribution(row: Judged, values: Array) -> str:
     def draw(axes: Any) -> None:
         left, right = axes
         limits = [limit for limit in (row.below, row.above) if limit is not None]
+        left.set_axisbelow(True)
         left.hist(values, bins=min(60, max(6, int(2 * len(values) ** (1 / 3)))), color=TRUE, alpha=0.85, lw=0)
         right.set_yscale("log")
         sides = [(side, limit) for side, limit in ((-1, row.below), (+1, row.above)) if limit is not None]
@@ -151,9 +152,11 @@ def distribution(row: Judged, values: Array) -> str:
         right.set_ylim(min(row.probability / 30.0, 0.2 / max(len(values), 1)), 1.5)
         handles, names = right.get_legend_handles_labels()
         unique = dict(zip(names, handles))
-        right.legend(unique.values(), unique.keys(), loc="lower center" if len(sides) == 2 else "best")
+        right.legend(
+            unique.values(), unique.keys(), loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False
+        )
 
-    return svg(draw, 2, 2.9)
+    return svg(draw, 2, 3.2)
 
 
 def _tails(row: Judged) -> tuple[Tail, ...]:
