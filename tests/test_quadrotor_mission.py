@@ -19,11 +19,11 @@ from landing_sim.errors import ScenarioError
 from landing_sim.estimators.readings import Reading
 from landing_sim.missions import quadrotor_eyes as eyes
 from landing_sim.missions import quadrotor_flight
-from landing_sim.missions.quadrotor_landing import Mission, build
+from landing_sim.missions.quadrotor_landing import Mission, build, scene
 from landing_sim.noise import Noise
 from landing_sim.plants.quadrotor import QuadrotorPlant
 from landing_sim.sections.quadrotor import METRICS, QuadrotorScenario
-from landing_sim.sensors.latency import LatencyConfig
+from landing_sim.sensors.latency import Latency, LatencyConfig
 from landing_sim.sensors.place_fix import PlaceFix, PlaceFixConfig
 from landing_sim.signals import CameraTruth, Command, Estimate, Sample, Step, Truth
 from landing_sim.world.planes import Box
@@ -172,6 +172,15 @@ def test_standing_ends_with_the_take_off() -> None:
         assert len(some.process(Sample("sonar", 1.0, 1.0, 0.3), lambda: NO_ESTIMATE)) == passed
 
 
+def test_a_camera_on_its_face_sends_nothing() -> None:
+    s = quadrotor("hover", "camera.width_px=320")
+    eye = eyes.renderer(s, scene(s), Noise(1, "p"))
+    camera = eyes.Uncovered(eyes.FisheyeCamera(eye, Latency(LatencyConfig(), Noise(1, "l")), 0.07))
+    truth, down = build(s, 1).parts.plant.truth(), np.array(eyes.rig(s).R_CB)
+    seen = [camera.sense(truth, CameraTruth(np.array([0.0, 0.0, z]), down, 0.0, 0.0)) for z in (-0.07, 0.01)]
+    assert seen[0] is not None and seen[0].data.frame.full().shape == (240, 320) and seen[1] is None
+
+
 def test_a_tour_visits_its_points() -> None:
     s = quadrotor("land")
     points = eyes.tour(s, (Box(1.5, 0.2),))
@@ -273,6 +282,7 @@ WRONG = {
     "task: hover\nlocalisation: {survey: false, map: m}\n": r"localisation.map: without a survey the map is made in flight",
     "task: hover\ncamera: {lens: wide}\n": r"s.yaml:4:10: camera.lens: unknown key",
     "scene: {boxes: [{x_m: 1, slope_x_deg: 40}]}\n": r"scene.boxes.0.height_m: at this slope its top dips below",
+    "scene: {boxes: [{x_m: 0.3}]}\n": r"s.yaml:3:23: scene.boxes.0.x_m: the flight starts on the ground at 0, 0",
     "task: hover\nfaults: [{sensor: camara, kind: 'off'}]\n": r"faults.0.sensor: no sensor 'camara' here.*mean 'camera'",
     "task: hover\nair: {gust_n: .nan}\n": r"s.yaml:4:15: air.gust_n: must be a finite number, not nan",
 }
@@ -287,7 +297,7 @@ def test_mistakes_are_told_with_their_place(text: str, tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_flown_is_told(tmp_path: Path) -> None:
-    crowded = quadrotor("land", "scene.clutter=20", "scene.boxes=[{x_m: 1.5, length_m: 4.9, width_m: 4.0}]")
+    crowded = quadrotor("land", "scene.clutter=20", "scene.boxes=[{x_m: 2.8, length_m: 4.9, width_m: 4.0}]")
     with pytest.raises(ScenarioError, match=r"cannot be flown: clutter: 20 boxes do not fit"):
         quadrotor_flight.fly(crowded)
     (tmp_path / "m.npz").write_text("no map")

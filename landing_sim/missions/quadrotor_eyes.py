@@ -31,7 +31,7 @@ from landing_sim.sensors.latency import Latency, LatencyConfig
 from landing_sim.sensors.position_fix import PositionFix, PositionFixConfig
 from landing_sim.sensors.sonar import Sonar, SonarConfig
 from landing_sim.sensors.strapdown import Strapdown, StrapdownConfig
-from landing_sim.signals import Command, Estimate, Measurement, Reference, Sample
+from landing_sim.signals import CameraTruth, Command, Estimate, Measurement, Reference, Sample, Truth
 from landing_sim.vision.landing_place import LandingPlaceDetector, Look
 from landing_sim.vision.slam import map_file
 from landing_sim.vision.slam.front_end import SlamFrontEnd, SonarToSlam
@@ -45,6 +45,7 @@ FOCAL_640 = 261.9  # [px] at 640 px: 140 deg across
 P_BC = (0.0, 0.0, 0.05)  # [m] camera, and sonar, from the cg
 LEGS = 0.12  # [m] of the cg above the feet
 STANDS, FLIES = 0.13, 0.20  # [m] sonar readings below, above
+TOUCHED = 0.005  # [m] the lens's height above the ground it lies on
 NOW = LatencyConfig(0.0, 0.0, 0.0)
 Vector = tuple[float, float, float]
 
@@ -63,6 +64,18 @@ def rig(s: QuadrotorScenario) -> Rig:
 def renderer(s: QuadrotorScenario, scene: Scene, noise: NoiseStream) -> FisheyeRenderer:
     """The true eye before the true scene."""
     return FisheyeRenderer(lens(s, 1.0 + s.camera.focal_error), scene, s.camera.noise_dn, noise.key())
+
+
+class Uncovered:
+    """interfaces.Sensor: a camera that sends nothing while it lies on the ground, as it does under a toppled vehicle."""
+
+    channels = 0
+
+    def __init__(self, camera: FisheyeCamera) -> None:
+        self.name, self.period, self._camera = camera.name, camera.period, camera
+
+    def sense(self, truth: Truth, camera: CameraTruth) -> Sample | None:
+        return self._camera.sense(truth, camera) if camera.p_RC[2] < -TOUCHED else None
 
 
 # ------------------------------------------------------------------------------------------------- front ends

@@ -245,9 +245,8 @@ def _seeing(
     detector = eyes.LandingPlaceDetector(eyes.lens(s), streams("detector")) if s.task == "land" else None
     localiser = eyes.SlamFrontEnd(slam, s.localisation.noise_m, streams("added"))
     looking: FrontEnd = eyes.Looking(localiser, detector)
-    camera = eyes.FisheyeCamera(
-        eyes.renderer(s, place, streams("pixels")), Latency(latency, streams("latency")), s.camera.period_s
-    )
+    eye = eyes.renderer(s, place, streams("pixels"))
+    camera = eyes.Uncovered(eyes.FisheyeCamera(eye, Latency(latency, streams("latency")), s.camera.period_s))
     heard = eyes.SonarToSlam(slam)
     if survey:
         return Eyes([camera], {"sonar": eyes.Standing(heard), "camera": Fresh(looking, s.filter.horizon_s)})

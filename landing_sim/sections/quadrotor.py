@@ -259,8 +259,19 @@ class QuadrotorScenario(Section):
             ]
             if 0.5 * (abs(rise[0]) + abs(rise[1])) > box.height_m:
                 problems.append((("scene", "boxes", i, "height_m"), "at this slope its top dips below the ground"))
+            if _covers_start(box):
+                problems.append(
+                    (("scene", "boxes", i, "x_m"), "the flight starts on the ground at 0, 0: keep clear of it")
+                )
         fixes = "position_fix" if self.localisation.kind == "emulated" else "camera"
         places = ["place_fix"] if self.localisation.kind == "emulated" else []
         problems += faults.problems(self.faults, ["imu", "sonar", fixes, *places], ["imu"], ["camera"])
         inconsistent(problems)
         return self
+
+
+def _covers_start(box: Platform) -> bool:
+    """Whether feet could stand on it at the start."""
+    c, s = math.cos(math.radians(box.yaw_deg)), math.sin(math.radians(box.yaw_deg))
+    along, across = c * box.x_m + s * box.y_m, c * box.y_m - s * box.x_m
+    return abs(along) < 0.5 * box.length_m + 0.2 and abs(across) < 0.5 * box.width_m + 0.2
