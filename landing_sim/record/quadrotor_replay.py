@@ -26,6 +26,7 @@ PLANES = np.array([(150, 150, 150), (70, 130, 255), (200, 70, 255)], np.uint8)
 IMAGE = "camera/image"
 AXES = (("x", "ahead x [m]"), ("y", "right y [m]"), ("H", "height H [m]"))
 EVERY = 4  # cycles between two poses
+SPAN = (-6.0, 6.0)  # [cm] of the errors' axes
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,8 +240,10 @@ def _blueprint(place: Place) -> Any:
     always = rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
     whole = rrb.TimeAxis(view_range=always)
 
-    def plot(entity: str, name: str, legend: bool = False) -> Any:
-        return rrb.TimeSeriesView(origin=entity, name=name, axis_x=whole, plot_legend=rrb.PlotLegend(visible=legend))
+    def plot(entity: str, name: str, span: tuple[float, float] | None = None) -> Any:
+        axis = None if span is None else rrb.ScalarAxis(range=span)
+        legend = rrb.PlotLegend(visible=False)  # the colours are those of the paths
+        return rrb.TimeSeriesView(origin=entity, name=name, axis_x=whole, axis_y=axis, plot_legend=legend)
 
     tops = np.vstack([np.zeros((1, 3)), *(top[:, :3] for top in place.tops[:1])])
     middle = 0.5 * (tops.min(axis=0) + tops.max(axis=0))
@@ -257,8 +260,8 @@ def _blueprint(place: Place) -> Any:
     image = rrb.Spatial2DView(
         origin=IMAGE, name="camera: features on ground (blue), raised (purple); way point (green)"
     )
-    positions = rrb.Vertical(*(plot(f"position/{axis}", name, axis == "H") for axis, name in AXES))
-    errors = rrb.Vertical(*(plot(f"error/{axis}", f"error {axis} [cm], 3 sigma") for axis, _ in AXES))
+    positions = rrb.Vertical(*(plot(f"position/{axis}", name) for axis, name in AXES))
+    errors = rrb.Vertical(*(plot(f"error/{axis}", f"error {axis} [cm], 3 sigma", SPAN) for axis, _ in AXES))
     rest = [plot("fixes/age", "age of a fix when it comes [ms]"), rrb.TextLogView(origin="events", name="events")]
     if place.tops:
         rest.insert(0, plot("place/height", "height of the landing place [cm]"))
