@@ -274,6 +274,10 @@ def test_pairs_have_the_baseline_asked_for_and_share_features() -> None:
     assert pair.first.p[0] == pytest.approx(0.6)  # 30 shared at 0.3 m: more than 0.2 x 40 or 0.4 x 20
     assert len(pair.ids) == 30
     assert pair.t == pytest.approx([-0.3, 0.0, 0.0])
+    further = views.pair(view, 0.35, 0.6, 20)
+    assert further is not None
+    assert further.first.p[0] == pytest.approx(0.5)  # 20 shared at 0.4 m
+    assert views.pair(view, 0.45, 0.6, 20) is None
     assert views.pair(replace(view, t=9.0), 0.15, 0.6, 20) is None  # all too old
 
 
