@@ -7,8 +7,9 @@ wholly in view; way points are pooled, and a pool of enough that agree is a land
 Source     Brockers et al. 2012, section 3.4.
            Departs: several planes are looked for besides the ground, and several places pooled apart. Whether one is too
            low, small or tilted is asked of its pool's mean, so that noise does not lift a low step over the limit. A
-           rectangle goes round all features that were found on its place so far. All round it ground must be seen, since a
-           place half in the map would else look like a smaller one.
+           rectangle goes round all features that were found on its place so far, and reaches half way to the ground seen
+           beside it: a place half in the map, or half in view, would else look like a smaller one. Once it has been
+           wholly in view, views of a part of it count too.
 """
 
 from __future__ import annotations
