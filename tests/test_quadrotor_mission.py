@@ -158,7 +158,8 @@ def test_what_only_the_truth_knows_changes_nothing(changes: dict, same: bool) ->
 
 def test_standing_ends_with_the_take_off() -> None:
     inner = Reading("sonar", "sonar", 0.1)
-    standing = eyes.Standing(inner)
+    placed = [False]
+    standing = eyes.Standing(inner, lambda: placed[0])
 
     def heard(height: float) -> list[str]:
         out = standing.process(Sample("sonar", 1.0, 1.0, height), lambda: NO_ESTIMATE)
@@ -166,6 +167,8 @@ def test_standing_ends_with_the_take_off() -> None:
 
     assert heard(0.12) == ["sonar", "position"] == heard(0.12) and heard(0.15) == ["sonar"]
     assert heard(0.12) == ["sonar", "position"] and heard(0.25) == ["sonar"] == heard(0.12)
+    standing, placed[0] = eyes.Standing(inner, lambda: placed[0]), True  # the camera knows better
+    assert heard(0.12) == ["sonar"]
     for passed in (True, False):
         some = eyes.While(inner, lambda passed=passed: passed)
         assert some.sensor == "sonar"

@@ -82,20 +82,22 @@ class Uncovered:
 
 
 class Standing:
-    """interfaces.FrontEnd for the sonar: until it takes off the vehicle stands where R begins, and knows it.
+    """interfaces.FrontEnd for the sonar: standing where R begins, and until the camera can tell, it knows where it is.
 
-    What `inner` makes of the readings comes besides.
+    What `inner` makes of the readings comes besides. The sonar cannot see the last few centimetres to the ground, so this
+    says little about height, and nothing once `placed`.
     """
 
     sensor = "sonar"
 
-    def __init__(self, inner: FrontEnd, sigma: float = 0.005) -> None:
-        self._inner, self._variance, self._stands = inner, np.full(3, sigma**2), True
+    def __init__(self, inner: FrontEnd, placed: Callable[[], bool]) -> None:
+        self._inner, self._placed, self._stands = inner, placed, True
+        self._variance = np.array([0.01, 0.01, 0.03]) ** 2
 
     def process(self, sample: Sample, estimate: Callable[[], Estimate]) -> tuple[Measurement, ...]:
         out = self._inner.process(sample, estimate)
         reading = float(sample.data)
-        self._stands &= reading < FLIES
+        self._stands &= reading < FLIES and not self._placed()
         if not self._stands or reading > STANDS:
             return out
         z = np.array([0.0, 0.0, -LEGS])

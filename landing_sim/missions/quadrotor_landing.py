@@ -249,7 +249,8 @@ def _seeing(
     camera = eyes.Uncovered(eyes.FisheyeCamera(eye, Latency(latency, streams("latency")), s.camera.period_s))
     heard = eyes.SonarToSlam(slam)
     if survey:
-        return Eyes([camera], {"sonar": eyes.Standing(heard), "camera": Fresh(looking, s.filter.horizon_s)})
+        standing = eyes.Standing(heard, lambda: localiser.located is not None)
+        return Eyes([camera], {"sonar": standing, "camera": Fresh(looking, s.filter.horizon_s)})
 
     def found() -> bool:
         return slam.chart.metric
