@@ -466,8 +466,8 @@ def test_a_fault_that_never_comes_changes_no_bit() -> None:
 
 
 def test_without_gyros_and_eyes_it_goes_around() -> None:
-    """No camera either from 500 m out, for 6 s: the approach is given up, and flown away on flows and airspeed."""
-    blind = "{sensor: camera, kind: off, from_x_m: -500, for_s: 6}"
+    """No camera either from 500 m out, for 3 s: the approach is given up after two, and flown away."""
+    blind = "{sensor: camera, kind: off, from_x_m: -500, for_s: 3}"
     flight = fly(
         "do128/inertial_off", *NEAR["do128"], f"faults=[{{sensor: inertial, kind: off, from_x_m: -600}}, {blind}]"
     )
@@ -475,7 +475,7 @@ def test_without_gyros_and_eyes_it_goes_around() -> None:
     assert flight.verdict.outcome == "go_around"
     begun = int(np.argmax(log["mode"] == "go_around"))
     assert -500.0 < log["true_x_m"][begun] < -350.0
-    assert log["true_H_m"].min() > 5.0
+    assert log["true_H_m"].min() > 15.0
     assert log["true_H_m"][-1] > log["true_H_m"].min() + 10.0
 
 
