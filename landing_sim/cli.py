@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 import traceback
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -239,7 +240,7 @@ def _fly(
     scenario: Scenario, label: str, out: Path | None, *, as_json: bool, live: bool, record: bool, leave: bool = True
 ) -> None:
     """Fly, write, show. Ends the command with the exit code that the result deserves, unless told not to `leave`."""
-    from landing_sim import progress, runner, vehicle
+    from landing_sim import ahead, progress, runner, vehicle
     from landing_sim.record.viewer import ReplayError
 
     folder = out or Path("out") / f"{scenario.name}-{scenario.seed}"
@@ -248,7 +249,7 @@ def _fly(
     with runner.out_folder(folder) as work:
         recording = work / runner.RECORDING if record else None
         try:
-            with progress.shown(scenario) as watch:
+            with progress.shown(scenario) as watch, nullcontext() if craft is None else ahead.helped():
                 flight = runner.fly(scenario, craft, watch=watch, recording=recording, live=live)
         except ReplayError as error:
             raise ConfigError([Problem(Mark("--live" if live else f"--out {folder}"), (), str(error))]) from None

@@ -63,28 +63,26 @@ def shade_windows(
             if min(corners[i, 0], corners[i, 1]) < 0 or corners[i, 0] + w > camera[3] or corners[i, 1] + h > camera[4]:
                 return False
         m = merged(corners, looked, boxes, member)
-    if m == n:
-        return shade(
-            out, corners, w, h, looked, whole, lines, seen, counts, horizon, camera, palette, lens, table, quantiles,
-            greys, key, index,
-        )  # fmt: skip
-    tops, parts = np.empty((m, 2), np.int64), np.zeros((m, 4), np.int64)
-    size = np.zeros(2, np.int64)  # an array, since `shade` would be compiled once more for the constant 0
-    for k in range(m):
-        tops[k, 0], tops[k, 1] = boxes[k, 0], boxes[k, 2]
-        parts[k, 2], parts[k, 3] = boxes[k, 1] - boxes[k, 0], boxes[k, 3] - boxes[k, 2]
-        size[0], size[1] = max(size[0], parts[k, 2]), max(size[1], parts[k, 3])
-    # blocks are all as large as the largest: near the frame's end a box lies further back in its own
-    for k in range(m):
-        for c in range(2):
-            parts[k, c] = max(0, tops[k, c] + size[c] - int(camera[3 + c]))
-            tops[k, c] -= parts[k, c]
-            parts[k, 2 + c] += parts[k, c]
-    made = np.empty((m * size[1], size[0]), np.uint8)
-    shade(
+    made, tops, parts, size = out, corners, looked, np.array([w, h])
+    if m < n:
+        tops, parts, size = np.empty((m, 2), np.int64), np.zeros((m, 4), np.int64), np.zeros(2, np.int64)
+        for k in range(m):
+            tops[k, 0], tops[k, 1] = boxes[k, 0], boxes[k, 2]
+            parts[k, 2], parts[k, 3] = boxes[k, 1] - boxes[k, 0], boxes[k, 3] - boxes[k, 2]
+            size[0], size[1] = max(size[0], parts[k, 2]), max(size[1], parts[k, 3])
+        # blocks are all as large as the largest: near the frame's end a box lies further back in its own
+        for k in range(m):
+            for c in range(2):
+                parts[k, c] = max(0, tops[k, c] + size[c] - int(camera[3 + c]))
+                tops[k, c] -= parts[k, c]
+                parts[k, 2 + c] += parts[k, c]
+        made = np.empty((m * size[1], size[0]), np.uint8)
+    inside = shade(  # called in one place: each would be a copy to compile
         made, tops, size[0], size[1], parts, whole, lines, seen, counts, horizon, camera, palette, lens, table, quantiles,
         greys, key, index,
     )  # fmt: skip
+    if m == n:
+        return inside
     for i in range(n):
         k = member[i]
         left, top = corners[i, 0] - tops[k, 0], corners[i, 1] - tops[k, 1] + k * size[1]
