@@ -65,7 +65,7 @@ class Fisheye:
         flat, whole = x * x + y * y, x * x + y * y + z * z
         near = (flat < (NEAR * z) ** 2) & (z > 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            bend = np.where(near, -2.0 / (3.0 * z**3), (z / whole - ratio) / np.where(near, 1.0, flat))
+            bend = np.where(near, 0.0, (z / whole - ratio) / np.where(near, 1.0, flat))  # times flat: NEAR^2
         J = np.empty((*p_C.shape[:-1], 2, 3))
         J[..., 0, 0] = ratio + x * x * bend
         J[..., 0, 1] = J[..., 1, 0] = x * y * bend
