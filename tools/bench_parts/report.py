@@ -65,6 +65,8 @@ def _baseline(b: Mapping[str, Any]) -> Iterator[str]:
     for key, label in (("render", "pixels"), ("vision", "looking"), ("estimate", "estimating"), ("frame", "a frame")):
         theirs, ours = b[f"{key}_us"], b[f"our_{key}_us"]
         yield f"    {label + ' [us CPU]':44s} {theirs:8.0f} {ours:8.0f} {theirs / ours:7.1f}"
+    theirs, ours = (b[f"{whose}vision_us"] + b[f"{whose}estimate_us"] for whose in ("", "our_"))
+    yield f"    {'  of it on board, pixels given [us CPU]':44s} {theirs:8.0f} {ours:8.0f} {theirs / ours:7.1f}"
 
 
 def _bound(bound: Mapping[str, Any]) -> Iterator[str]:
