@@ -200,8 +200,8 @@ def effects(found: Sequence[Sensitivity], most: int = 7) -> str:
             ax.set_xlim(0.0, max(0.3, *(1.08 * effect.first_order_high for effect in shown)))
             ax.tick_params(axis="y", length=0)
             ax.grid(axis="y", visible=False)
-            ax.set_title(label(one.metric))
-            ax.set_xlabel(f"share of the variance (ranks: R² = {one.r_squared:.2f})")
+            ax.set_title(f"{label(one.metric)}, ranks: R² = {one.r_squared:.2f}")
+            ax.set_xlabel("share of the variance")
         for ax in np.atleast_1d(axes)[len(found) :]:
             ax.set_visible(False)
 

@@ -50,7 +50,7 @@ td.chosen { font-weight: 650; } h2 + p.lead { margin-top: -6px; }
 <td>{{ row.event }}{% for note in row.notes %}<small>{{ note }}</small>{% endfor %}</td>
 <td class="n">{{ row.limit }}</td>
 <td class="n">{{ row.count }} of {{ row.n }}
-{% if row.go_arounds %}<small>{{ row.go_arounds }} go-arounds left out</small>{% endif %}
+{% if row.go_arounds %}<small>{{ row.go_arounds }} go-around{{ 's' if row.go_arounds > 1 }} left out</small>{% endif %}
 {% if row.unmeasured %}<small>{{ row.unmeasured }} without the figure</small>{% endif %}</td>
 <td class="n{{ ' chosen' if row.method == 'count' }}">{{ row.by_count }}</td>
 <td class="n{{ ' chosen' if row.method == 'tail' }}">{{ row.by_tail }}<small>{{ row.fit }}</small></td>
