@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from landing_sim import loop, papers
-from landing_sim.missions import quadrotor_landing
+from landing_sim.estimators.readings import Fresh
+from landing_sim.missions import quadrotor_eyes, quadrotor_landing
 from landing_sim.papers import brockers_2012 as paper
 from landing_sim.papers import brockers_checks as check
 from landing_sim.papers import brockers_figures as figures
@@ -22,6 +23,8 @@ from landing_sim.papers.claims import Measured
 from landing_sim.papers.flights import Run
 from landing_sim.plants.quadrotor import QuadrotorPlant
 from landing_sim.signals import Command, Truth
+from landing_sim.vision.slam.front_end import SlamFrontEnd
+from landing_sim.vision.slam.slam import Slam
 
 CLAIMS = {claim.id: claim for claim in paper.CLAIMS}
 
@@ -110,6 +113,13 @@ def test_flights_from_several_seeds_give_a_brief_each() -> None:
     assert isinstance(found, list) and [brief.outcome for brief in found] == ["hovered", "hovered"]
     first, second = (brief.metrics["hover_rms_m"] for brief in found)
     assert first != second and 0.01 < first < 0.05 and 0.01 < second < 0.05
+
+
+def test_the_detector_is_found_inside_what_is_wrapped_round_it() -> None:
+    wanted = trials.load("quadrotor/land", trials.EMULATED, 1)
+    slam = SlamFrontEnd(Slam(quadrotor_eyes.rig(wanted), quadrotor_eyes.settings(wanted)))
+    looking = quadrotor_eyes.Looking(slam, None)
+    assert trials._looking(Fresh(quadrotor_eyes.While(looking, lambda: True), 0.8)) is looking
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from landing_sim import loop, scenario
+from landing_sim.estimators.readings import Fresh
 from landing_sim.missions import quadrotor_flight, quadrotor_landing
+from landing_sim.missions.quadrotor_eyes import Looking
 from landing_sim.papers.claims import Job
 from landing_sim.papers.flights import Flown, Run
 from landing_sim.sections.quadrotor import QuadrotorScenario
@@ -198,10 +200,17 @@ def _watch(job: Beside) -> Watched:
     return Watched(t, p, np.array(p_hat), table[:, 2:], table[:, 1], table[:, 0])
 
 
+def _looking(front_end: Any) -> Looking:
+    """What looks at the images, inside what is wrapped round it."""
+    while not isinstance(front_end, Looking):
+        front_end = front_end.front_end if isinstance(front_end, Fresh) else front_end.inner
+    return front_end
+
+
 def _detect(job: Detection) -> Heights:
     wanted = load(job.scenario, job.changes, job.seed)
     mission = quadrotor_landing.build(wanted, wanted.seed)
-    eye: Any = mission.parts.front_ends["camera"]
+    eye = _looking(mission.parts.front_ends["camera"])
     found: list[tuple[float, float]] = []
     at, agreed, last = math.nan, math.nan, None
     for step in mission.steps():
