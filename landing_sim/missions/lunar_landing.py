@@ -16,10 +16,9 @@ from landing_sim.estimators.optic_flow.estimator import ContactFrontEnd, FlowEst
 from landing_sim.estimators.optic_flow.kalman import FlowEkf, FlowUkf, Spreads
 from landing_sim.estimators.optic_flow.lpv_observer import SPARSE, LpvObserver
 from landing_sim.estimators.optic_flow.reference import Reference, reference
-from landing_sim.interfaces import Controller, Estimator, FrontEnd, Guidance, NoiseStream, Sensor
-from landing_sim.missions.runway_landing import Outcome
+from landing_sim.interfaces import FrontEnd, NoiseStream
+from landing_sim.missions.flight import Outcome, Parts, flown
 from landing_sim.noise import Noise
-from landing_sim.plants.jsbsim import PlantError
 from landing_sim.plants.lander import LanderPlant, Start
 from landing_sim.sections.lunar import Deviation, LunarScenario
 from landing_sim.sensors.optic_flow import FootSwitch, MotionSensor, MotionSensorConfig
@@ -60,43 +59,17 @@ class OpenLoop:
         return None, Command(elevator=attitude / self.full_attitude, throttle=thrust / self.full_thrust)
 
 
-@dataclass(frozen=True, slots=True)
-class Parts:
-    """The concrete parts of one descent, in the order of the loop's arguments."""
-
-    clock: loop.Clock
-    plant: LanderPlant
-    world: NoAir
-    sensors: tuple[Sensor, ...]
-    front_ends: dict[str, FrontEnd]
-    estimator: Estimator
-    guidance: Guidance
-    controller: Controller
-
-
 class Mission:
     """One descent, ready to be flown once."""
 
-    def __init__(self, scenario: LunarScenario, parts: Parts, terrain: Terrain) -> None:
+    def __init__(self, scenario: LunarScenario, parts: Parts[LanderPlant, NoAir], terrain: Terrain) -> None:
         self.parts, self.terrain = parts, terrain
         self._limit = scenario.time.limit_s
         self._outcome: Outcome | None = None
 
     def steps(self) -> Iterator[Step]:
         """Fly to the end, a Step a control cycle. The last Step is the one that ended it."""
-        p = self.parts
-        end, reason = "time", ""
-        try:
-            for step in loop.simulate(
-                p.clock, p.plant, p.world, p.sensors, p.front_ends, p.estimator, p.guidance, p.controller, p.plant.trimmed
-            ):  # fmt: skip
-                yield step
-                end = self._ended(step)
-                if end:
-                    break
-        except (PlantError, FloatingPointError) as error:
-            end, reason = "numeric_error", str(error)
-        self._outcome = Outcome(end, p.plant.touchdown, reason)
+        self._outcome = yield from flown(self.parts, self.parts.plant.trimmed, self._ended)
 
     def outcome(self) -> Outcome:
         """Raises RuntimeError before the descent is over."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from landing_sim import loop, paths
@@ -14,12 +13,11 @@ from landing_sim.estimators.last_fix import LastFix
 from landing_sim.estimators.readings import Fresh, Reading, StrapdownFrontEnd
 from landing_sim.estimators.rewind import Rewind
 from landing_sim.estimators.strapdown_ekf import StrapdownEkf
-from landing_sim.interfaces import Controller, Estimator, FrontEnd, Guidance, NoiseStream, Sensor
+from landing_sim.interfaces import Estimator, FrontEnd, Guidance, NoiseStream, Sensor
 from landing_sim.missions.failing import with_faults
-from landing_sim.missions.runway_landing import Outcome
+from landing_sim.missions.flight import Outcome, Parts, flown
 from landing_sim.noise import Noise
 from landing_sim.plants.attitude_loop import AttitudeConfig
-from landing_sim.plants.jsbsim import PlantError
 from landing_sim.plants.quadrotor import QuadrotorPlant, Start
 from landing_sim.sections.quadrotor import Platform, QuadrotorScenario
 from landing_sim.sensors.latency import Latency, LatencyConfig
@@ -38,24 +36,12 @@ DRAG = 0.16  # [N/(m/s)] of aircraft/pelican
 CLUTTERED = (-1.0, 4.0, -2.0, 2.0)  # [m] x from, to, y from, to
 
 
-@dataclass(frozen=True, slots=True)
-class Parts:
-    """The concrete parts of one flight, in the order of the loop's arguments."""
-
-    clock: loop.Clock
-    plant: QuadrotorPlant
-    world: Drift
-    sensors: tuple[Sensor, ...]
-    front_ends: dict[str, FrontEnd]
-    estimator: Estimator
-    guidance: Guidance
-    controller: Controller
-
-
 class Mission:
     """One flight, ready to be flown once."""
 
-    def __init__(self, scenario: QuadrotorScenario, parts: Parts, boxes: tuple[Box, ...]) -> None:
+    def __init__(
+        self, scenario: QuadrotorScenario, parts: Parts[QuadrotorPlant, Drift], boxes: tuple[Box, ...]
+    ) -> None:
         self.parts, self.scene_boxes = parts, boxes
         self._limit = scenario.time.limit_s
         self._outcome: Outcome | None = None
@@ -63,19 +49,7 @@ class Mission:
 
     def steps(self) -> Iterator[Step]:
         """Fly to the end, a Step a cycle. The last Step is the one that ended it."""
-        p = self.parts
-        end, reason = "time", ""
-        try:
-            for step in loop.simulate(
-                p.clock, p.plant, p.world, p.sensors, p.front_ends, p.estimator, p.guidance, p.controller, Command()
-            ):
-                yield step
-                end = self._ended(step)
-                if end:
-                    break
-        except (PlantError, FloatingPointError) as error:
-            end, reason = "numeric_error", str(error)
-        self._outcome = Outcome(end, p.plant.touchdown, reason)
+        self._outcome = yield from flown(self.parts, Command(), self._ended)
 
     def outcome(self) -> Outcome:
         """Raises RuntimeError before the flight is over."""

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 from landing_sim import loop, paths
 from landing_sim.control.landing_lq import LandingController
-from landing_sim.interfaces import Estimator, FrontEnd, Guidance, NoiseStream, Sensor
+from landing_sim.interfaces import NoiseStream
 from landing_sim.missions import onboard, truth
+from landing_sim.missions.flight import Outcome, Parts, flown
 from landing_sim.noise import Noise
 from landing_sim.plants.aircraft import JsbsimPlant
-from landing_sim.plants.jsbsim import PlantError
 from landing_sim.record.judge import CRASH_SINK
 from landing_sim.scenario import Scenario
-from landing_sim.signals import Step, Touchdown
+from landing_sim.signals import Step
 from landing_sim.vehicle import Vehicle
 from landing_sim.world.wind import Wind
 
@@ -24,34 +23,13 @@ GO_AROUND_ENDS = 300.0  # [m] beyond the threshold
 UPSET_ROLL, UPSET_PITCH = 1.0, 0.8  # [rad] beyond these it is falling, not flying
 UNDERGROUND = 30.0  # [m] below the threshold: where there is no ground
 
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """How the flight ended: "stopped", "crash", "off_runway", "go_around", "time" or "numeric_error"."""
-
-    end: str
-    touchdown: Touchdown | None
-    reason: str = ""  # what the flight model said when it could not go on
-
-
-@dataclass(frozen=True, slots=True)
-class Parts:
-    """The concrete parts of one flight, in the order of the loop's arguments."""
-
-    clock: loop.Clock
-    plant: JsbsimPlant
-    world: Wind
-    sensors: tuple[Sensor, ...]
-    front_ends: dict[str, FrontEnd]
-    estimator: Estimator
-    guidance: Guidance
-    controller: LandingController
+RunwayParts = Parts[JsbsimPlant, Wind]
 
 
 class Mission:
     """One flight, ready to be flown once."""
 
-    def __init__(self, scenario: Scenario, parts: Parts) -> None:
+    def __init__(self, scenario: Scenario, parts: RunwayParts) -> None:
         self.parts = parts
         self._limit = scenario.time.limit_s
         self._half_width, self._length = 0.5 * scenario.runway.width_m, scenario.runway.length_m
@@ -60,28 +38,7 @@ class Mission:
 
     def steps(self) -> Iterator[Step]:
         """Fly to the end, a Step a control cycle. The last Step is the one that ended it."""
-        p = self.parts
-        end, reason = "time", ""
-        try:
-            for step in loop.simulate(
-                p.clock,
-                p.plant,
-                p.world,
-                p.sensors,
-                p.front_ends,
-                p.estimator,
-                p.guidance,
-                p.controller,
-                p.plant.trimmed,
-            ):
-                yield step
-                ended = self._ended(step)
-                if ended:
-                    end = ended
-                    break
-        except (PlantError, FloatingPointError) as error:
-            end, reason = "numeric_error", str(error)
-        self._outcome = Outcome(end, p.plant.touchdown, reason)
+        self._outcome = yield from flown(self.parts, self.parts.plant.trimmed, self._ended)
 
     def outcome(self) -> Outcome:
         """Raises RuntimeError before the flight is over."""

@@ -41,7 +41,7 @@ from landing_sim.estimators import states
 from landing_sim.estimators.edge_model import edge_model
 from landing_sim.estimators.rewind import Rewind
 from landing_sim.estimators.runway_ekf import RunwayEkf
-from landing_sim.missions.runway_landing import Parts
+from landing_sim.missions.runway_landing import RunwayParts
 from landing_sim.scenario import Scenario, load
 from landing_sim.signals import Command, EdgeSet, Measurement, Status, Step
 from landing_sim.vehicle import Vehicle
@@ -137,7 +137,7 @@ class Flight:
 
 def one(scenario: Scenario, vehicle: Vehicle) -> Flight:
     """Fly it. Raises ValueError if the estimator is not one that the bound is for, or nothing is left to compare."""
-    found: list[Parts] = []
+    found: list[RunwayParts] = []
     steps: list[Step] = []
     flight = land(scenario, vehicle, prepare=found.append, watch=steps.append)
     parts = found[0]

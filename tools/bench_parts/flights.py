@@ -22,7 +22,7 @@ import numpy as np
 
 from landing_sim import runner
 from landing_sim.missions import runway_landing
-from landing_sim.missions.runway_landing import Parts
+from landing_sim.missions.runway_landing import RunwayParts
 from landing_sim.plants.aircraft import JsbsimPlant
 from landing_sim.record import judge, log
 from landing_sim.scenario import Scenario, dump
@@ -71,7 +71,7 @@ def land(
     scenario: Scenario,
     vehicle: Vehicle,
     recording: Path | None = None,
-    prepare: Callable[[Parts], None] | None = None,
+    prepare: Callable[[RunwayParts], None] | None = None,
     watch: Callable[[Step], None] | None = None,
     builder: log.LogBuilder | None = None,
 ) -> Landing:
@@ -144,7 +144,7 @@ def tape(scenario: Scenario, vehicle: Vehicle) -> Tape:
     commands: list[Command] = []
     ends: list[tuple[float, ...]] = []
 
-    def listen(parts: Parts) -> None:
+    def listen(parts: RunwayParts) -> None:
         step, plant = parts.plant.step, parts.plant
 
         def stepping(command: Command, wind_R: Any) -> None:

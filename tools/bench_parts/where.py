@@ -17,7 +17,7 @@ from typing import Any
 
 from bench_parts.flights import land
 from landing_sim.missions import runway_landing
-from landing_sim.missions.runway_landing import Parts
+from landing_sim.missions.runway_landing import RunwayParts
 from landing_sim.record.log import LogBuilder
 from landing_sim.scenario import Scenario
 from landing_sim.sensors.render import RenderedFrame
@@ -96,7 +96,7 @@ def parts_of(scenario: Scenario, vehicle: Vehicle) -> dict[str, dict[str, float]
     def charge(owner: Any, method: str, name: str) -> None:
         setattr(owner, method, watch.on(name, getattr(owner, method)))
 
-    def prepare(parts: Parts) -> None:
+    def prepare(parts: RunwayParts) -> None:
         charge(parts.plant, "step", "plant: step")
         for method in ("truth", "camera"):
             charge(parts.plant, method, "plant: truth, camera pose")
