@@ -42,6 +42,7 @@ class Campaign:
     promises: tuple[Promise, ...]
     seeds: Sequence[int] = range(1, 41)
     changes: tuple[str, ...] = ()
+    places: tuple[tuple[str, ...], ...] = ((),)  # more changes: every seed is flown in each of these places
 
 
 def box(metric: str, low: float, high: float) -> tuple[Promise, Promise]:
@@ -103,6 +104,23 @@ GLIDE = (
 )
 ALONE = (Promise("safe", "share", 0.95),)  # without inertial unit: a safe landing or a go-around
 ALONE_LANDS = (*ALONE, Promise("landed", "share", 0.7))
+FOUND = (
+    Promise("landed", "share", 0.95),
+    Promise("landed", "lower95"),
+    Promise("miss_m", "p95", high=0.08),
+    Promise("miss_m", "max", high=0.08),
+    Promise("way_point_error_m", "max", high=0.05),
+    Promise("platform_height_error_m", "max", high=0.01),
+)
+HOVER = (Promise("hover_rms_m", "mean", high=0.035), Promise("hover_p99_m", "mean"))
+UNFUSED = (Promise("hover_rms_m", "mean", 0.08, 0.13), Promise("hover_p99_m", "mean"))
+SEEN = ("time.step_s=0.002", "camera.width_px=320")
+PLACES = (
+    ("scene.seed=1", "scene.boxes=[{x_m: 2.1, y_m: 0.2, yaw_deg: 20}]"),
+    ("scene.seed=2", "scene.boxes=[{x_m: 1.9, y_m: -0.3, yaw_deg: -35}]"),
+    ("scene.seed=3", "scene.boxes=[{x_m: 2.3, height_m: 0.2}]"),
+)
+WAY = (*SEEN, "path.goal_x_m=2.6", "path.climb_mps=0.2")
 STILL = ("wind.turbulence=null",)
 ON_GLIDE = ("initial.y_m=0", "initial.height_m=270.4", "initial.heading_deg=0", "observer.outputs=width")
 EFFECTS = {
@@ -148,6 +166,11 @@ CAMPAIGNS: dict[str, Campaign] = {
     "transport_alone_flare": Campaign(
         "transport/inertial_off", ALONE, range(1, 31), ("faults=[{sensor: inertial, kind: off, below_height_m: 12}]",)
     ),
+    "quadrotor_hover": Campaign("quadrotor/hover", HOVER, range(501, 509), (*SEEN, "time.limit_s=66")),
+    "quadrotor_hover_unfused": Campaign("quadrotor/hover_unfused", UNFUSED, range(501, 509), (*SEEN, "time.limit_s=66")),
+    "quadrotor_fast": Campaign("quadrotor/land_fast", FOUND, range(501, 518), WAY, PLACES),
+    "quadrotor_slow": Campaign("quadrotor/land", FOUND, range(501, 518), WAY, PLACES),
+    "quadrotor_unfused": Campaign("quadrotor/land_unfused", FOUND[1:2], range(501, 505), WAY, PLACES),
     "do128_unknown": Campaign("do128/gibert", UNKNOWN[:6], range(1, 31)),
 }  # fmt: skip
 
@@ -159,6 +182,9 @@ def fly(job: tuple[str, tuple[str, ...], int]) -> dict[str, float]:
 
     name, changes, seed = job
     wanted = scenario.load(name, [*changes, f"seed={seed}"])
+    if wanted.mission != "runway_landing":
+        verdict = runner.fly(wanted, None).verdict
+        return {**verdict.metrics, "landed": float(verdict.outcome == "landed")}
     flight = runner.fly(wanted, vehicle.load(wanted.aircraft.model))
     metrics = dict(flight.verdict.metrics)
     metrics["landed"] = float(flight.verdict.outcome == "landed")
@@ -201,6 +227,9 @@ def ranging(log: Any) -> dict[str, float]:
 
 
 def statistic(values: np.ndarray, name: str) -> float:
+    """Of the flights that have the figure: one that never touches down has no place of touchdown, and counts as not landed."""
+    if np.isfinite(values).any():
+        values = values[np.isfinite(values)]
     magnitude = np.abs(values)
     match name:
         case "p95":
@@ -217,12 +246,18 @@ def statistic(values: np.ndarray, name: str) -> float:
             return float(np.sqrt(np.mean(values**2)))
         case "mean" | "share":
             return float(values.mean())
+        case "lower95":
+            from landing_sim.campaign.verdict import count_bounds
+
+            return 1.0 - count_bounds(int((values == 0.0).sum()), len(values)).upper
     raise ValueError(name)
 
 
 def run(name: str, pool: ProcessPoolExecutor) -> bool:
     campaign = CAMPAIGNS[name]
-    jobs = [(campaign.scenario, campaign.changes, seed) for seed in campaign.seeds]
+    jobs = [
+        (campaign.scenario, (*campaign.changes, *place), seed) for place in campaign.places for seed in campaign.seeds
+    ]
     flights = list(pool.map(fly, jobs))
     columns = {key: np.array([f[key] for f in flights]) for key in flights[0]}
     kept = []
@@ -234,6 +269,7 @@ def run(name: str, pool: ProcessPoolExecutor) -> bool:
         "name": name,
         "scenario": campaign.scenario,
         "changes": list(campaign.changes),
+        "places": [list(place) for place in campaign.places],
         "seeds": [campaign.seeds[0], campaign.seeds[-1]],
         "flights": len(flights),
         "commit": commit(),
