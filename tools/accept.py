@@ -227,7 +227,7 @@ def ranging(log: Any) -> dict[str, float]:
 
 
 def statistic(values: np.ndarray, name: str) -> float:
-    """Of the flights that have the figure: one that never touches down has no place of touchdown, and counts as not landed."""
+    """Of the flights that have the figure: one that never touches down has no place of touchdown, and is not landed."""
     if np.isfinite(values).any():
         values = values[np.isfinite(values)]
     magnitude = np.abs(values)
