@@ -128,7 +128,10 @@ WRONG = {
     "section is a number": ("camera: 3\n", r"s.yaml:3:9: camera: must be a mapping of keys to values, not 3"),
     "null section": ("camera:\n", r"s.yaml:3:1: camera: must be a mapping of keys to values, not null"),
     "fault of no kind": ("faults:\n  - {sensor: gyro}\n", r"s.yaml:4:5: faults.0.kind: missing: this key is required"),
-    "literal": ("camera: {renderer: line_a}\n", r"s.yaml:3:20: camera.renderer: must be .* \(did you mean 'line_aa'\?\)"),
+    "literal": (
+        "camera: {renderer: line_a}\n",
+        r"s.yaml:3:20: camera.renderer: must be .* \(did you mean 'line_aa'\?\)",
+    ),
     "metric": ("criteria: [{metric: rang_m, high: 1}]\n", r"s.yaml:3:21: criteria.0.metric: .*did you mean 'range_m'"),
     "limits missing": ("criteria: [{metric: range_m}]\n", r"s.yaml:3:12: criteria.0: needs low, high or both"),
     "limits crossed": ("criteria: [{metric: nis, low: 2, high: 1}]\n", r"s.yaml:3:31: criteria.0.low: is above"),
@@ -161,7 +164,9 @@ def test_all_mistakes_at_once_in_order(tmp_path: Path) -> None:
 
 
 def test_schema_version_is_required_and_known(tmp_path: Path) -> None:
-    assert problems(tmp_path, "mission: runway_landing\n") == ["s.yaml:1:1: schema_version: missing: this key is required"]
+    assert problems(tmp_path, "mission: runway_landing\n") == [
+        "s.yaml:1:1: schema_version: missing: this key is required"
+    ]
     assert problems(tmp_path, HEAD.replace("1", "2", 1)) == ["s.yaml:1:17: schema_version: must be 1, not 2"]
 
 
@@ -246,7 +251,10 @@ def test_set_changes_values_and_lists(tmp_path: Path) -> None:
         ("seed=[1", "--set seed: seed: not YAML: expected ',' or ']'"),
         ("seed=!x 1", "--set seed: seed: tags are not allowed: !x"),
         ("aircraft.model=dox", "--set aircraft.model: aircraft.model: no aircraft 'dox'"),
-        ("time.cycle_s=0.0601", "--set time.cycle_s: time.cycle_s: 0.0601 is not a whole multiple of time.step_s = 0.005"),
+        (
+            "time.cycle_s=0.0601",
+            "--set time.cycle_s: time.cycle_s: 0.0601 is not a whole multiple of time.step_s = 0.005",
+        ),
         (".".join("a" * 30) + "=1", f"--set {'.'.join('a' * 30)}: (file): nested deeper than 20 levels"),
     ],
 )
