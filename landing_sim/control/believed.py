@@ -64,17 +64,10 @@ def _with_wind(estimate: Estimate, values: list[float]) -> list[float]:
     return values[:12] + [estimate.get(name, 0.0) for name in _WIND]
 
 
-_latest: tuple[Estimate, Believed, Motion] | None = None
-
-
 def moving(estimate: Estimate) -> tuple[Believed, Motion]:
-    """`believed` and its `motion`, worked out once for the guidance and the controller that ask one after the other."""
-    global _latest
-    latest = _latest
-    if latest is None or latest[0] is not estimate:
-        b = believed(estimate)
-        _latest = latest = (estimate, b, motion(b))
-    return latest[1:]
+    """`believed` and its `motion`."""
+    b = believed(estimate)
+    return b, motion(b)
 
 
 def motion(b: Believed) -> Motion:
