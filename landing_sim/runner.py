@@ -3,46 +3,28 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import shutil
 import tempfile
-import time
 from collections.abc import Callable, Container, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import Any
 
 from landing_sim.errors import Mark, Problem, ScenarioError
-from landing_sim.geometry.pinhole import Intrinsics
-from landing_sim.missions import runway_landing
+from landing_sim.missions import runway_flight
+from landing_sim.missions.flight import Flight
 from landing_sim.noise import NoiseStream
-from landing_sim.plants.jsbsim import PlantError
 from landing_sim.record import judge, log, parquet
-from landing_sim.record.overlay import BelievedCamera
 from landing_sim.scenario import Scenario, dump
 from landing_sim.signals import Step
 from landing_sim.vehicle import Vehicle
 
-if TYPE_CHECKING:
-    from landing_sim.record.replay import Scene
-
 RESULT, LOG, RECORDING, SCENARIO = "result.json", "log.parquet", "recording.rrd", "scenario.json"
 _OURS = (RESULT, LOG, RECORDING, SCENARIO)
-MISSIONS = {"runway_landing": runway_landing.build}
-"""What builds the flight, by the scenario's `mission`."""
-
-
-@dataclass(frozen=True, slots=True)
-class Flight:
-    """A flight that is over."""
-
-    log: log.FlightLog
-    verdict: judge.Verdict
-    wall_s: float
+_MISSIONS = {"lunar_landing": "lunar_flight", "quadrotor_landing": "quadrotor_flight"}
+"""Where a mission without a vehicle file is flown, in landing_sim.missions: each loads what only it needs."""
 
 
 def fly(
@@ -65,104 +47,13 @@ def fly(
 
     Raises ScenarioError where the aircraft cannot fly what the scenario wants at the start, ReplayError from the recording.
     """
-    if scenario.mission not in MISSIONS:
-        return _others(scenario, watch, recording, live, noise, other)
-    if vehicle is None:
-        raise ValueError(f"{scenario.name}: this mission needs a vehicle")
-    started = time.perf_counter()
-    try:
-        mission = MISSIONS[scenario.mission](scenario, vehicle, scenario.seed, scenario.run, noise)
-    except (PlantError, ValueError) as error:
-        raise ScenarioError([Problem(Mark(scenario.name), (), f"cannot be flown: {error}")]) from error
-    listeners = [] if watch is None else [watch]
-    recorder = None
-    if recording is not None:
-        from landing_sim.record.replay import Recorder
-
-        recorder = Recorder(recording, scene(scenario, vehicle), scenario.record.frames_hz, live)
-        listeners.append(recorder.add)
-    builder, eyes = log.LogBuilder(), _looks(scenario)
-    sights = None
-    if eyes:
-        from landing_sim.record.sights import Sights
-
-        sights = Sights(eyes)
-        listeners.append(sights.add)
-    for step in mission.steps():
-        builder.add(step)
-        for listener in listeners:
-            listener(step)
-    outcome = mission.outcome()
-    flown = builder.finish(
-        scenario=dump(scenario),
-        seed=scenario.seed,
-        touchdown=outcome.touchdown,
-        end=outcome.end,
-        runway={"width_m": scenario.runway.width_m, "length_m": scenario.runway.length_m},
-        extra={"reason": outcome.reason} if outcome.reason else None,
-    )
-    if sights is not None:
-        sights.into(flown)
-    if recorder is not None:
-        recorder.close(flown, other)
-    return Flight(flown, judge.judge(flown, limits(scenario)), time.perf_counter() - started)
-
-
-def _others(
-    scenario: Any,
-    watch: Callable[[Step], None] | None,
-    recording: Path | None,
-    live: bool,
-    noise: Callable[[str], NoiseStream] | None,
-    other: log.FlightLog | None,
-) -> Flight:
-    """Missions that bring a flight of their own; each loads what only it needs."""
-    if scenario.mission == "lunar_landing":
-        from landing_sim.missions import lunar_flight
-
-        return lunar_flight.fly(scenario, watch, recording, live, noise)
-    from landing_sim.missions import quadrotor_flight
-
-    return quadrotor_flight.fly(scenario, watch, recording, live, noise, other)
-
-
-def _looks(scenario: Scenario) -> tuple[float, ...]:
-    """[rad] below the body's forward axis, where the optic-flow sensors truly look."""
-    flow = scenario.sensors.optic_flow
-    return tuple(math.radians(angle + flow.mounting_error_deg) for angle in flow.angles_deg)
-
-
-def scene(scenario: Scenario, vehicle: Vehicle) -> Scene:
-    """What stands still in a recording. Predicted edges are drawn as the onboard side believes them."""
-    from landing_sim.record.replay import Scene
-
-    camera, runway, believed = scenario.camera, scenario.runway, scenario.filter.believed_width_m
-    slope = math.atan(runway.slope_percent / 100.0)
-    start = scenario.initial
-    return Scene(
-        camera=BelievedCamera(
-            Intrinsics.centred(camera.width_px, camera.height_px, camera.focal_px * scenario.believed.focal_scale),
-            np.array(vehicle.camera.p_BC_m),
-            runway.width_m if believed is None else believed,
-            runway.length_m,
-            slope,
-        ),
-        width=runway.width_m,
-        length=runway.length_m,
-        slope=slope,
-        span=vehicle.size.span_m,
-        fuselage=vehicle.size.length_m,
-        markings=runway.markings,
-        ranged=scenario.filter.kind == "observer",
-        looks=_looks(scenario),
-        start=(start.x_m, start.y_m, -start.height_m),
-        title=f"{scenario.name}, seed {scenario.seed}",
-    )
-
-
-def limits(scenario: Scenario) -> tuple[judge.Limit, ...]:
-    """The scenario's criteria as the judge takes them."""
-    return tuple(judge.Limit(c.metric, c.low, c.high, c.source) for c in scenario.criteria)
+    if scenario.mission == "runway_landing":
+        if vehicle is None:
+            raise ValueError(f"{scenario.name}: this mission needs a vehicle")
+        return runway_flight.fly(scenario, vehicle, watch, recording, live, noise, other)
+    mission = import_module(f"landing_sim.missions.{_MISSIONS[scenario.mission]}")
+    flight: Flight = mission.fly(scenario, watch, recording, live, noise, other)
+    return flight
 
 
 def check_out(folder: Path, ours: Container[str] = _OURS) -> None:

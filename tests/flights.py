@@ -7,12 +7,13 @@ from functools import cache
 import numpy as np
 
 from landing_sim import runner, scenario, vehicle
+from landing_sim.missions.flight import Flight
 from landing_sim.record.judge import counted
 from landing_sim.record.log import FlightLog
 
 
 @cache
-def fly(name: str, *changes: str, seed: int = 1) -> runner.Flight:
+def fly(name: str, *changes: str, seed: int = 1) -> Flight:
     """A shipped scenario with changes, as given to --set."""
     wanted = scenario.load(name, [*changes, f"seed={seed}"])
     return runner.fly(wanted, vehicle.load(wanted.aircraft.model))

@@ -9,12 +9,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from landing_sim.control.autonomy import FAST, FLYING, MODES, SLOW, Autonomy, AutonomySettings, Memory, moved
+from landing_sim.control.autonomy import FAST, MODES, SLOW, Autonomy, AutonomySettings, Memory, moved
 from landing_sim.estimators.strapdown_ekf import NAMES
 from landing_sim.signals import Estimate, Reference
 
 S = AutonomySettings()
 STEP = 0.01
+
+FLYING = ("take_off", "hover", "traverse", "hover_above", "descend", "refuse")
+"""Modes that need localisation."""
 
 
 def seen(t: float, localised: bool = True, platform: bool = False, valid: bool = True, **values: float) -> Estimate:

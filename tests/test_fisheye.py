@@ -80,10 +80,6 @@ def test_inside() -> None:
     assert FULL.inside(uv, 8.0).tolist() == [False] * 5
 
 
-def test_half_size_sees_the_same() -> None:
-    assert FULL.resized(0.5) == HALF
-
-
 @pytest.mark.parametrize("size", [(0, 480, 200.0), (640, 480, -1.0), (640, 480, math.nan), (640, 480, 100.0)])
 def test_refused(size: tuple[int, int, float]) -> None:
     with pytest.raises(ValueError, match="fisheye"):

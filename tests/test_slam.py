@@ -11,10 +11,10 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
+import slam_trial as trial
 
 from landing_sim.geometry.fisheye import Fisheye
 from landing_sim.geometry.so3 import from_euler
-from landing_sim.missions import slam_trial as trial
 from landing_sim.noise import Noise
 from landing_sim.signals import Estimate, Sample
 from landing_sim.types import Array
@@ -22,13 +22,12 @@ from landing_sim.vision.slam import bundle, lens, map_file, scale, two_view
 from landing_sim.vision.slam.corners import corners, pyramid
 from landing_sim.vision.slam.front_end import SlamFrontEnd, SonarToSlam
 from landing_sim.vision.slam.map import Map
-from landing_sim.vision.slam.measure import path_error
 from landing_sim.vision.slam.patches import align
 from landing_sim.vision.slam.pose import Pose, fit_pose, turned
 from landing_sim.vision.slam.settings import LOOKS_DOWN, SlamSettings
 from landing_sim.vision.slam.slam import Slam
 
-HALF = trial.LENS.resized(0.5)
+HALF = Fisheye(320, 240, 0.5 * trial.LENS.focal)
 F, CX, CY = HALF.focal, HALF.cx, HALF.cy
 
 
@@ -257,12 +256,12 @@ def test_patch_is_found_where_the_plane_says_it_went(flight: Flown) -> None:
 def test_path_error_takes_the_similarity_out() -> None:
     g = np.random.default_rng(11)
     p = g.normal(size=(50, 3))
-    error = path_error(1.02 * p @ from_euler(0.01, 0.02, 0.3).T + [0.1, 0.0, 0.2], p)
+    error = trial.path_error(1.02 * p @ from_euler(0.01, 0.02, 0.3).T + [0.1, 0.0, 0.2], p)
     assert error.scale == pytest.approx(1.02)
     assert error.rms < 1e-12
     assert error.median > 0.1
     with pytest.raises(ValueError, match="cannot be compared"):
-        path_error(p[:2], p[:2])
+        trial.path_error(p[:2], p[:2])
 
 
 # --- the whole

@@ -22,6 +22,7 @@ from landing_sim.campaign.dispersions import draw
 from landing_sim.campaign.figures import GOOD, NEES_BANDS, figures
 from landing_sim.campaign.plan import Campaign, Plan
 from landing_sim.errors import ConfigError, Mark
+from landing_sim.missions.flight import Flight
 from landing_sim.noise import NoiseStream
 from landing_sim.record import parquet
 from landing_sim.record.judge import counted
@@ -86,7 +87,7 @@ def fly(
     changes: Sequence[str] = (),
     recording: Path | None = None,
     other: FlightLog | None = None,
-) -> tuple[Scenario, runner.Flight]:
+) -> tuple[Scenario, Flight]:
     """Fly run `run` of a campaign as it is flown there, bit for bit, unless something else is wanted.
 
     values : of `draw`, instead of drawing them here
@@ -116,7 +117,7 @@ def scenario_of(plan: Plan, run: int, values: Mapping[str, Any], changes: Sequen
     return scenario.check(document)
 
 
-def measure(flight: runner.Flight, wanted: Scenario) -> dict[str, float]:
+def measure(flight: Flight, wanted: Scenario) -> dict[str, float]:
     """Every figure that a campaign keeps, by figures.figures."""
     log, touchdown = flight.log, flight.log.touchdown
     found, vehicle = dict(flight.verdict.metrics), _vehicle(wanted)

@@ -18,8 +18,6 @@ from typing import Literal, NamedTuple
 from landing_sim.signals import Estimate, Reference
 
 MODES = ("wait", "take_off", "hover", "traverse", "hover_above", "descend", "cut", "hold", "land_blind", "refuse")
-FLYING = ("take_off", "hover", "traverse", "hover_above", "descend", "refuse")
-"""Modes that need localisation."""
 EPS = 1e-9  # [s]
 Vector = tuple[float, float, float]
 
@@ -98,10 +96,8 @@ class Autonomy:
         extra = {"x": memory.p[0], "vx": memory.v[0], "vy": memory.v[1]}
         if memory.mode in ("hover_above", "descend", "cut"):
             extra |= {"lx": memory.place[0], "ly": memory.place[1], "lH": -memory.place[2]}
-        reference = Reference(
-            memory.mode, 0.0, -memory.p[2], -memory.v[2], memory.p[1], s.heading, 0.0, extra=extra
-        )  # fmt: skip
-        return memory, reference
+        p, v = memory.p, memory.v
+        return memory, Reference(memory.mode, 0.0, -p[2], -v[2], p[1], s.heading, 0.0, extra=extra)
 
     def decide(self, m: Memory, estimate: Estimate) -> Memory:
         """The phase at estimate.t."""

@@ -81,10 +81,6 @@ class Fisheye:
         right, low = self.width - 1 - margin, self.height - 1 - margin
         return np.asarray((u >= margin) & (u <= right) & (v >= margin) & (v <= low))
 
-    def resized(self, factor: float) -> Fisheye:
-        """The same lens before a sensor of `factor` times as many pixels each way."""
-        return Fisheye(round(self.width * factor), round(self.height * factor), self.focal * factor)
-
 
 def _angle_ratio(p_C: Array) -> Array:
     """(...) theta / rho of p_C (..., 3), rho its distance from the axis: 1 / z on the axis, NaN behind and at 0."""

@@ -1,18 +1,21 @@
-"""What every mission has: concrete parts, the loop flown with them until somebody ends it, and how it ended."""
+"""What every mission has: concrete parts, the loop flown with them until somebody ends it, how it ended, and its log."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from landing_sim import loop
+from landing_sim.errors import Mark, Problem, ScenarioError
 from landing_sim.interfaces import Controller, Estimator, FrontEnd, Guidance, Plant, Sensor, World
 from landing_sim.plants.jsbsim import PlantError
+from landing_sim.record import judge, log
 from landing_sim.signals import Command, Step, Touchdown
 
 AnyPlant = TypeVar("AnyPlant", bound=Plant)
 AnyWorld = TypeVar("AnyWorld", bound=World)
+AnyMission = TypeVar("AnyMission")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,3 +54,34 @@ def flown(p: Parts[AnyPlant, AnyWorld], trim: Command, ended: Callable[[Step], s
     except (PlantError, FloatingPointError) as error:
         return Outcome("numeric_error", p.plant.touchdown, str(error))
     raise AssertionError("the loop flies for ever")
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """A flight that is over."""
+
+    log: log.FlightLog
+    verdict: judge.Verdict
+    wall_s: float
+
+
+def ready(name: str, build: Callable[[], AnyMission]) -> AnyMission:
+    """What `build` makes. Raises ScenarioError where the vehicle cannot fly what the scenario `name` wants at the start."""
+    try:
+        return build()
+    except (PlantError, ValueError) as error:
+        raise ScenarioError([Problem(Mark(name), (), f"cannot be flown: {error}")]) from error
+
+
+def finished(
+    builder: log.LogBuilder, scenario: Any, outcome: Outcome, runway: Mapping[str, float] | None = None
+) -> log.FlightLog:
+    """The log of a flight that is over."""
+    return builder.finish(
+        scenario=scenario.model_dump(mode="json"),
+        seed=scenario.seed,
+        touchdown=outcome.touchdown,
+        end=outcome.end,
+        runway=runway,
+        extra={"reason": outcome.reason} if outcome.reason else None,
+    )

@@ -1,4 +1,4 @@
-"""One lunar descent from a scenario to a log and a verdict: what `runner.fly` does for aircraft."""
+"""One lunar descent from a scenario to a log and a verdict."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from landing_sim.errors import Mark, Problem, ScenarioError
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.interfaces import NoiseStream
+from landing_sim.missions.flight import Flight, finished, ready
 from landing_sim.missions.lunar_landing import Mission, build
-from landing_sim.plants.jsbsim import PlantError
 from landing_sim.record import judge, log
 from landing_sim.sections.lunar import LunarScenario
 from landing_sim.sensors.optic_flow import FlowReading
@@ -23,7 +22,6 @@ from landing_sim.signals import Step
 
 if TYPE_CHECKING:
     from landing_sim.record.lunar_replay import LunarScene
-    from landing_sim.runner import Flight
 
 PICTURE = (320, 240, 280.0)  # width, height, focal length [px] of a recording's camera
 JUDGED_FROM = 5.0  # [s] errors before are the first guess's
@@ -37,15 +35,14 @@ def fly(
     recording: Path | None = None,
     live: bool = False,
     noise: Callable[[str], NoiseStream] | None = None,
+    other: log.FlightLog | None = None,
 ) -> Flight:
-    """Fly it to its end. Raises ScenarioError where it cannot begin, ReplayError from the recording."""
-    from landing_sim import runner
+    """Fly it to its end; `other` is not shown: a lunar recording has no place for a second flight.
 
+    Raises ScenarioError where it cannot begin, ReplayError from the recording.
+    """
     started = time.perf_counter()
-    try:
-        mission = build(scenario, scenario.seed, scenario.run, noise)
-    except (PlantError, ValueError) as error:
-        raise ScenarioError([Problem(Mark(scenario.name), (), f"cannot be flown: {error}")]) from error
+    mission = ready(scenario.name, lambda: build(scenario, scenario.seed, scenario.run, noise))
     builder, readings = log.LogBuilder(), []
     recorder, due = None, 0.0
     camera = Intrinsics.centred(*PICTURE)
@@ -62,18 +59,11 @@ def fly(
             due = step.truth.t + 1.0 / scenario.record.frames_hz
             seen = picture(mission.terrain, camera, step.camera.p_RC, step.camera.R_CR)
             recorder.picture(step.truth.t, seen, step.camera.p_RC, step.camera.R_CR)
-    outcome = mission.outcome()
-    flown = builder.finish(
-        scenario=scenario.model_dump(mode="json"),
-        seed=scenario.seed,
-        touchdown=outcome.touchdown,
-        end=outcome.end,
-        extra={"reason": outcome.reason} if outcome.reason else None,
-    )
+    flown = finished(builder, scenario, mission.outcome())
     _add_flows(flown, readings, len(scenario.sensors.angles_deg))
     if recorder is not None:
         recorder.close(flown)
-    return runner.Flight(flown, verdict(flown, scenario), time.perf_counter() - started)
+    return Flight(flown, verdict(flown, scenario), time.perf_counter() - started)
 
 
 def scene(scenario: LunarScenario, mission: Mission) -> LunarScene:

@@ -1,4 +1,4 @@
-"""One quadrotor flight from a scenario to a log and a verdict: what `runner.fly` does for aircraft."""
+"""One quadrotor flight from a scenario to a log and a verdict."""
 
 from __future__ import annotations
 
@@ -6,22 +6,18 @@ import math
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from landing_sim.errors import Mark, Problem, ScenarioError
 from landing_sim.interfaces import NoiseStream
+from landing_sim.missions.flight import Flight, finished, ready
 from landing_sim.missions.quadrotor_landing import Mission, build
-from landing_sim.plants.jsbsim import PlantError
 from landing_sim.record import judge, log
 from landing_sim.sections.quadrotor import METRICS, QuadrotorScenario
 from landing_sim.signals import Step
 from landing_sim.types import Array
 from landing_sim.world.planes import Box
-
-if TYPE_CHECKING:
-    from landing_sim.runner import Flight
 
 HOVER_FROM = 5.0  # [s] after the hover began
 LEAST_HOVER = 10.0  # [s] that is a hover
@@ -48,13 +44,8 @@ def fly(
 
     Raises ScenarioError where it cannot begin, ReplayError from the recording.
     """
-    from landing_sim import runner
-
     started = time.perf_counter()
-    try:
-        mission = build(scenario, scenario.seed, scenario.run, noise)
-    except (PlantError, ValueError) as error:
-        raise ScenarioError([Problem(Mark(scenario.name), (), f"cannot be flown: {error}")]) from error
+    mission = ready(scenario.name, lambda: build(scenario, scenario.seed, scenario.run, noise))
     builder, told = log.LogBuilder(), []
     camera = None
     if recording is not None:
@@ -68,18 +59,11 @@ def fly(
             watch(step)
         if camera is not None:
             camera.add(step)
-    outcome = mission.outcome()
-    flown = builder.finish(
-        scenario=scenario.model_dump(mode="json"),
-        seed=scenario.seed,
-        touchdown=outcome.touchdown,
-        end=outcome.end,
-        extra={"reason": outcome.reason} if outcome.reason else None,
-    )
+    flown = finished(builder, scenario, mission.outcome())
     _add(flown, np.array(told))
     if camera is not None:
         camera.close(flown, other)
-    return runner.Flight(flown, verdict(flown, scenario, mission), time.perf_counter() - started)
+    return Flight(flown, verdict(flown, scenario, mission), time.perf_counter() - started)
 
 
 _TOLD = (

@@ -22,7 +22,6 @@ from landing_sim.world.terrain_relief import fractal, uniform
 MEAN = 128.0  # grey of every texture, so that a surface's tone and contrast are set elsewhere
 SPREAD = 34.0  # its standard deviation
 COVER = 0.45  # of the plane is hidden by the leaves of each factor e in size
-WIDE = 128  # texels: larger leaves and mottling are drawn coarsely
 LARGEST = 0.6  # [m] a leaf's longer side; no more than an eighth of the tile
 
 

@@ -20,12 +20,12 @@ from typing import Any
 
 import numpy as np
 
-from landing_sim import runner
-from landing_sim.missions import runway_landing
+from landing_sim.missions import runway_flight, runway_landing
+from landing_sim.missions.flight import finished
 from landing_sim.missions.runway_landing import RunwayParts
 from landing_sim.plants.aircraft import JsbsimPlant
 from landing_sim.record import judge, log
-from landing_sim.scenario import Scenario, dump
+from landing_sim.scenario import Scenario
 from landing_sim.signals import Command, Step
 from landing_sim.vehicle import Vehicle
 
@@ -95,7 +95,7 @@ def land(
     if recording is not None:
         from landing_sim.record.replay import Recorder
 
-        recorder = Recorder(recording, runner.scene(scenario, vehicle), scenario.record.frames_hz)
+        recorder = Recorder(recording, runway_flight.scene(scenario, vehicle), scenario.record.frames_hz)
     opening = Cost.now() - before
     builder = log.LogBuilder() if builder is None else builder
     for step in mission.steps():
@@ -106,17 +106,11 @@ def land(
             due = recorder._next_frame
             recorder.add(step)
             recorded += recorder._next_frame != due
-    outcome = mission.outcome()
-    flown = builder.finish(
-        scenario=dump(scenario),
-        seed=scenario.seed,
-        touchdown=outcome.touchdown,
-        end=outcome.end,
-        runway={"width_m": scenario.runway.width_m, "length_m": scenario.runway.length_m},
-    )
+    runway = {"width_m": scenario.runway.width_m, "length_m": scenario.runway.length_m}
+    flown = finished(builder, scenario, mission.outcome(), runway)
     if recorder is not None:
         recorder.close(flown)
-    verdict = judge.judge(flown, runner.limits(scenario))
+    verdict = judge.judge(flown, runway_flight.limits(scenario))
     flight = Cost.now() - ready
     if recording is not None:
         flight = flight + opening
