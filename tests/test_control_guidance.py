@@ -332,6 +332,23 @@ def test_holding_blind_goes_around() -> None:
     assert (still.mode, gone.mode) == ("hold", "go_around")
 
 
+def test_a_height_below_ground_is_not_believed() -> None:
+    """4 m below the surface with no wheel on it: up, below the decision height too; on its wheels it rolls out."""
+    guidance = LandingGuidance(SETTINGS)
+    memory, _ = fly(guidance, guidance.init(), *(on_path(guidance, k * CYCLE, 100.0) for k in range(5)))
+    for flags, expected in (({"on_ground": False}, "go_around"), ({"on_ground": True}, "rollout")):
+        assert fly(guidance, memory, estimate(0.3, x=100.0, H=1.8 - 4.0, flags=flags))[1].mode == expected
+    assert fly(guidance, memory, estimate(0.3, x=100.0, H=1.8 - 2.0, flags={"on_ground": False}))[1].mode != "go_around"
+
+
+def test_no_more_downdraught_is_corrected_for_than_there_can_be() -> None:
+    guidance = LandingGuidance(SETTINGS)
+    memory = guidance.init()
+    for k in range(100):
+        memory, reference = guidance.step(memory, on_path(guidance, k * CYCLE, -400.0, wz=25.0))
+    assert reference.extra["downdraught"] == pytest.approx(10.0, abs=0.01)
+
+
 def test_long_blackout_goes_around_but_not_below_decision_height() -> None:
     guidance = LandingGuidance(SETTINGS)
     for x, expected in ((-400.0, "go_around"), (100.0, "flare")):

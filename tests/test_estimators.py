@@ -20,7 +20,7 @@ from landing_sim.estimators.runway_filter import Blocks, FilterConfig
 from landing_sim.geometry.runway_image import image_line, plane_normal
 from landing_sim.geometry.so3 import camera_from_body, from_euler
 from landing_sim.noise import Noise
-from landing_sim.signals import Status
+from landing_sim.signals import Feature, Status
 from landing_sim.world.dryden import DrydenTurbulence, Turbulence
 
 PAR = parameters(AircraftBelief(), 0.01)
@@ -384,6 +384,20 @@ def test_missing_edges_are_not_used_and_say_so() -> None:
     np.testing.assert_array_equal(after.x, memory.x)
     assert after.residuals is not None and after.residuals.dof == 0
     assert after.misses == memory.misses + 1
+
+
+def test_a_horizon_alone_does_not_keep_the_runway() -> None:
+    """What is left is searched for: without an edge of the runway for a while the filter says that it has lost it."""
+    rng = np.random.default_rng(6)
+    truth, _, ekf, memory = bench.run(FilterConfig(lost_after=3, gate_sigma=None), 6, frames=40)
+    for k in range(3):
+        assert not ekf.read(memory).flags["lost"], k
+        m = bench.edges(truth[-1], memory.t, rng)
+        assert m.geometry is not None
+        m.z[m.geometry.feature != Feature.HORIZON] = np.nan
+        memory = ekf.update(memory, m)
+        assert memory.residuals is not None and memory.residuals.dof > 0
+    assert ekf.read(memory).flags["lost"]
 
 
 def test_late_measurements_replayed_equal_in_order_data() -> None:

@@ -44,6 +44,16 @@ def test_the_first_level_is_the_campaign_itself(plan: Plan) -> None:
     assert (outcome, value) == (row.outcome, row.figures["peak_roll_deg"])
 
 
+def test_the_updraught_that_the_falsifier_once_crashed_with_is_landed_in() -> None:
+    """8.5 m/s over the threshold, and the filter lost the borderlines there, believed itself 35 m below the ground."""
+    gust = "{at_x_m: -137.5, gradient_m: 195.0, shape: pulse, vertical_mps: 8.519301795959475}"
+    _, flight = landing.fly(load("do128/campaign_wind"), 0, changes=[f"wind.discrete_gust={gust}"])
+    log = flight.log
+    airborne = ~log["flag_on_ground"].astype(bool) & (log["t_s"] > 2.0)
+    assert flight.verdict.outcome == "landed"
+    assert np.abs(log.error("H"))[airborne].max() < 0.5
+
+
 def test_a_move_moves_everything_a_little(plan: Plan) -> None:
     """The crosswind drawn blends as told, and the flight is another one; small moves change it little."""
     values = [

@@ -19,6 +19,7 @@ from landing_sim.control.settings import GearSettings, GuidanceSettings, PathSet
 from landing_sim.signals import Estimate, Reference
 
 GRAVITY = 9.80665
+MOST_DRAUGHT = 10.0  # [m/s] that attitude is corrected for: what is beyond is an estimate gone wrong, not air
 AIRBORNE = ("acquire", "hold", "capture", "glide", "flare", "decrab")
 
 
@@ -170,7 +171,8 @@ class LandingGuidance:
         dt = min(max(estimate.t - memory.t, 0.0), 1.0)
         share = dt / (dt + self.settings.decrab.wind_filter_s) if math.isfinite(memory.seen) else 1.0
         crosswind = memory.crosswind + share * (b.wy - memory.crosswind)
-        downdraught = memory.downdraught + share * (b.wz - memory.downdraught)
+        draught = min(max(b.wz, -MOST_DRAUGHT), MOST_DRAUGHT)
+        downdraught = memory.downdraught + share * (draught - memory.downdraught)
         started = mode == "go_around" and (memory.mode != mode or not math.isfinite(memory.seen))
         bounced = memory.mode == "rollout" and mode == "decrab"
         start = (estimate.t, b.H, m.H_dot) if started else (estimate.t, wheels[0], 0.0) if bounced else memory.start
@@ -309,6 +311,10 @@ class LandingGuidance:
             if down or waiting >= s.touchdown_confirm_s:
                 return "rollout", 0.0
             return mode, waiting
+        if (
+            down is not None and height < -g.underground_m
+        ):  # no wheel bears weight: not the aircraft, the estimate is lost
+            return "go_around", 0.0
         waiting = 0.0
         if height > g.decision_height_m and mode != "acquire":
             if not estimate.valid and estimate.t - memory.seen > g.blackout_s:

@@ -353,7 +353,9 @@ class DecrabSettings:
 
 @dataclass(frozen=True, slots=True)
 class GoAroundSettings:
-    """When an approach is given up. Below decision_height_m it is always continued."""
+    """When an approach is given up. Below decision_height_m it is continued, unless the wheels are believed to be more than
+    underground_m below the surface while none bears weight.
+    """
 
     decision_height_m: float
     stable_by_m: float
@@ -367,11 +369,12 @@ class GoAroundSettings:
     acquire_s: float = 3.0  # without a runway found: climb away
     hold_s: float = 40.0  # without its range known: climb away, and
     hold_height_m: float = 60.0  # below this wheel height
+    underground_m: float = 3.0
 
     __pydantic_config__ = _STRICT
 
     def __post_init__(self) -> None:
-        _positive(climb_deg=self.climb_deg, pull_mps2=self.pull_mps2)
+        _positive(climb_deg=self.climb_deg, pull_mps2=self.pull_mps2, underground_m=self.underground_m)
 
 
 @dataclass(frozen=True, slots=True)

@@ -282,12 +282,12 @@ class RunwayEkf:
         )  # fmt: skip
         D = memory.D
         if D is None and not starting:
-            x, P, innovation, status, nis, found, used, threshold = edges_dense(
+            x, P, innovation, status, nis, found, used, runway, threshold = edges_dense(
                 memory.x, memory.P, index, self.blocks.starts, *told
             )
         else:
             cov = self._covariance(memory)
-            nu, R, Hx, use, innovation, status, found, used, threshold = weigh(memory.x, cov, index, *told)
+            nu, R, Hx, use, innovation, status, found, used, runway, threshold = weigh(memory.x, cov, index, *told)
             R_used = R * np.maximum(1.0, np.abs(nu) / (np.sqrt(R) * c.huber)) if starting else R
             x, P, D, step, nis = self._correct(memory, Hx, R_used, nu, use)
             for _ in range(c.start_iterations - 1 if starting else 0):
@@ -300,7 +300,7 @@ class RunwayEkf:
             P=P,
             D=D,
             frames=memory.frames + 1,
-            misses=0 if used else memory.misses + 1,
+            misses=0 if runway else memory.misses + 1,  # a horizon alone tells no place
             threshold_in_view=threshold,
             residuals=Residuals(innovation, status, nis, used),
             reinflated=max(0, memory.reinflated - 1),

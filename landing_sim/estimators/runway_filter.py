@@ -50,7 +50,7 @@ class FilterConfig:
     huber: float = 2.0
     watchdog_share: float = 0.35  # smoothed share of rejected edges that means "locked out"
     watchdog_memory: float = 5.0  # frames
-    lost_after: int = 30  # frames without edges
+    lost_after: int = 30  # frames without edges of the runway
     pose_gate: float = 5.0  # when flying blind: a pose further off than this many sigma is not believed
     approach_angle: float = -3.0 * RAD  # believed flight path while nothing is known
 
@@ -70,7 +70,7 @@ class Memory(NamedTuple):
     airspeed: float = 50.0  # last readings, for the start
     gyro: Array = _STILL
     frames: int = 0  # images since the start (or since the watchdog's last re-inflation)
-    misses: int = 0  # images in a row without an edge
+    misses: int = 0  # images in a row without an edge of the runway
     rejected: float = 0.0  # smoothed share
     on_ground: bool = False
     threshold_in_view: bool = False

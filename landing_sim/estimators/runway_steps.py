@@ -21,7 +21,7 @@ from landing_sim.estimators.kalman import (
     update_ud,
 )
 from landing_sim.estimators.states import DRIVING, JPAN, JTILT, N
-from landing_sim.geometry.runway_image import THRESHOLD
+from landing_sim.geometry.runway_image import HORIZON, THRESHOLD
 from landing_sim.jit import kernel
 from landing_sim.types import Array
 
@@ -64,14 +64,14 @@ def weigh(
     x: Array, cov: Array, index: np.ndarray, z: Array, variance: Array, extra: float, gate: float, feature: np.ndarray,
     status: np.ndarray, centre: Array, direction: Array, pan: float, tilt: float, lever: Array, focal: Array,
     slope: float,
-) -> tuple[Array, Array, Array, np.ndarray, Array, np.ndarray, int, int, bool]:  # fmt: skip
+) -> tuple[Array, Array, Array, np.ndarray, Array, np.ndarray, int, int, bool, bool]:  # fmt: skip
     """What edges say against the state x (26,) with covariance cov (n, n): see `edge_model` for what describes them.
 
     z, variance (n,) as measured, NaN where not found; extra [px^2] is added to the variance; an innovation of a square
     beyond `gate` times its variance is not used.
 
     Returns nu (n,) and R (n,), 0 and 1 where not found; Hx (n, 26); use (n,) bool; nu with NaN; status (n,) with the
-    gate's; and how many were found, how many are used, whether one of these lies on the threshold.
+    gate's; and how many were found, how many are used, whether one of these lies on the runway, and on its threshold.
     """
     n = len(z)
     h, Hx = np.empty(n), np.empty((n, N))
@@ -91,12 +91,13 @@ def weigh(
             if math.isfinite(z[i]) and not use[i]:
                 status[i] = _REJECTED
     found = used = 0
-    threshold = False
+    runway = threshold = False
     for i in range(n):
         found += math.isfinite(z[i])
         used += use[i]
+        runway |= use[i] and feature[i] != HORIZON
         threshold |= use[i] and feature[i] == THRESHOLD
-    return nu, R, Hx, use, innovation, status, found, used, threshold
+    return nu, R, Hx, use, innovation, status, found, used, runway, threshold
 
 
 @kernel
@@ -132,16 +133,16 @@ def edges_dense(
     x: Array, P: Array, index: np.ndarray, starts: np.ndarray, z: Array, variance: Array, extra: float, gate: float,
     feature: np.ndarray, status: np.ndarray, centre: Array, direction: Array, pan: float, tilt: float, lever: Array,
     focal: Array, slope: float,
-) -> tuple[Array, Array, Array, np.ndarray, float, int, int, bool]:  # fmt: skip
+) -> tuple[Array, Array, Array, np.ndarray, float, int, int, bool, bool]:  # fmt: skip
     """`weigh` and `correct_dense` in one: an array that Python never sees is one that it need not be handed.
 
-    Returns x, P; nu with NaN, status (n,), the NIS; how many were found and used, whether the threshold was.
+    Returns x, P; nu with NaN, status (n,), the NIS; found, used, runway, threshold as `weigh` counts them.
     """
-    nu, R, Hx, use, innovation, verdict, found, used, threshold = weigh(
+    nu, R, Hx, use, innovation, verdict, found, used, runway, threshold = weigh(
         x, P, index, z, variance, extra, gate, feature, status, centre, direction, pan, tilt, lever, focal, slope
     )
     x_after, P_after, _, nis = correct_dense(x, P, index, starts, Hx, R, nu, use)
-    return x_after, P_after, innovation, verdict, nis, found, used, threshold
+    return x_after, P_after, innovation, verdict, nis, found, used, runway, threshold
 
 
 @kernel

@@ -78,6 +78,18 @@ def _covered(rows: Array, side: int, s0: float, s1: float, y: float) -> float:
 
 
 @kernel
+def _inset(
+    line: Array, sigma: float, h: int, su: float, sv: float, au: float, av: float, d_u: float, d_v: float
+) -> float:
+    """Share of the way (d_u, d_v) along a border by which a mask of 2 h + 1 pixels, the runway's side of its profile
+    included, stays off a `line` at its end, on whose positive side it lies.
+    """
+    depth = h * abs(line[0] * au + line[1] * av) + _CLEARANCE + 2.0 * sigma
+    depth += 3.5 * max(0.0, -(line[0] * su + line[1] * sv))
+    return depth / max(1e-9, abs(line[0] * d_u + line[1] * d_v))  # type: ignore[no-any-return]
+
+
+@kernel
 def place_border(
     F: Array,
     I: np.ndarray,
@@ -125,11 +137,9 @@ def place_border(
     d_u, d_v = q_b[0] / q_b[2] - a_u, q_b[1] / q_b[2] - a_v
     t0 = t1 = span = 0.0
     for h in range(half, 0, -1):
-        # the mask, the runway's side of its profile included, stays clear of the threshold and of the far end
-        depth = h * abs(row[0] * au + row[1] * av) + _CLEARANCE + 2.0 * sigma[THRESHOLD]
-        depth += 3.5 * max(0.0, -(row[0] * su + row[1] * sv))
-        inset = depth / max(1e-9, abs(row[0] * d_u + row[1] * d_v))
-        t0, t1 = inset if lo <= 0.0 else 0.0, 1.0 - (inset if hi >= length and not unknown else 0.0)
+        # the far end runs as the horizon does; the threshold's line is none any more when the camera passes over it
+        t0 = _inset(row, sigma[THRESHOLD], h, su, sv, au, av, d_u, d_v) if lo <= 0.0 else 0.0
+        t1 = 1.0 - (_inset(-sky, sigma[HORIZON], h, su, sv, au, av, d_u, d_v) if hi >= length and not unknown else 0.0)
         span = (t1 - t0) * max(abs(d_u), abs(d_v))  # in pixels of the mask
         half = h
         if n < 2 or span >= 2 * h + 1:  # two short ones tell where the border runs, a long one does not
