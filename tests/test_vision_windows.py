@@ -342,7 +342,7 @@ def test_windows_at_mapped_taxiway_mouths_are_dropped_and_unmapped_ones_mislead(
 
 @pytest.mark.parametrize("x", [-60.0, -20.0, -6.0, -4.0, -3.0, 3.0, 40.0])
 def test_borders_stay_in_view_high_over_the_threshold(x: float) -> None:
-    """12 m up, nose 9 deg down: the far end of the runway is well below the horizon, the threshold right below the camera."""
+    """12 m up, nose 9 deg down: the far end is well below the horizon, the threshold right below the camera."""
     pose = pose_of((x, 0.5, 12.0, 0.0, -9.0, 0.0))
     pan, tilt = fixate(pose)
     w = WindowPlanner(RunwayMap(), BelievedCamera(CAMERA, LEVER)).place(sight(pose, pan, tilt), COV, COUNTS)

@@ -4,7 +4,8 @@ In the air  u = u_ref - K (x - x_ref), longitudinal (u w q theta H int_V int_H) 
 u, v, w are velocities through the air, so that what acts on the wing is fed back, and the wind enters as a reference:
 theta_ref carries the updraught, psi_ref (from guidance) the crab. A gust along the nose changes lift at once and airspeed
 for a moment: it is taken out of the airspeed fed back, since engines are slower than it, and the elevator answers it by
-itself. Gains and trim are interpolated over airspeed, those of the surfaces as moments (times V²).
+itself. That a reported wind falls towards the ground is no gust: engines make up for it as it comes. Gains and trim are
+interpolated over airspeed, those of the surfaces as moments (times V²).
 
 Source     Dickmanns & Schell 1992, section 6: state feedback with integral action on speed and altitude.
 """
@@ -21,6 +22,7 @@ from landing_sim.control.design import Design, PointDesign
 from landing_sim.control.pointing import look_along
 from landing_sim.control.rollout import Rollout, RolloutMemory
 from landing_sim.control.settings import ThrustSettings
+from landing_sim.control.shear import expected_share
 from landing_sim.control.tables import Schedule, interpolate
 from landing_sim.signals import Command, Estimate, Reference
 
@@ -39,7 +41,7 @@ class ControlMemory:
     elevator: float = math.nan  # [rad]
     aileron: float = 0.0
     rudder: float = 0.0
-    tailwind: float = math.nan  # [m/s] smoothed, along the nose
+    tailwind: float = math.nan  # [m/s] smoothed, along the nose, less what is expected
     asked: float = math.nan  # [rad] of the elevator, before its limits; where these are recovered from slowly
     rollout: RolloutMemory = ON_TOUCHDOWN
 
@@ -48,10 +50,14 @@ class LandingController:
     """interfaces.Controller. Constants only; all memory is in ControlMemory."""
 
     __slots__ = ("_camera", "_flaps", "_ground_effect", "_gust", "_integral", "_limits", "_look", "_per_gust", "_recovery",
-                 "_rollout", "_schedule", "_slowest", "_thrust", "_trim")  # fmt: skip
+                 "_reported", "_rollout", "_schedule", "_slowest", "_thrust", "_trim")  # fmt: skip
 
-    def __init__(self, design: Design, look: tuple[float, float] = (0.0, 0.0)) -> None:
-        """look: pan and tilt [rad] that the platform is held at until the runway is found."""
+    def __init__(
+        self, design: Design, look: tuple[float, float] = (0.0, 0.0), reported: tuple[float, float] | None = None
+    ) -> None:
+        """look: pan and tilt [rad] that the platform is held at until the runway is found; reported: the air's velocity
+        [m/s] along R's x and y at 33 ft, if the tower has told.
+        """
         s = design.settings
         points = sorted(design.points, key=lambda p: p.model.airspeed)
         self._schedule = Schedule(tuple(p.model.airspeed for p in points), tuple(_row(p) for p in points))
@@ -65,6 +71,7 @@ class LandingController:
         self._integral = (s.integral_limits["int_V"], s.integral_limits["int_H"])
         c = s.camera
         self._camera, self._look = (math.radians(c.elevation_deg), math.radians(c.max_deg)), look
+        self._reported = reported
         self._flaps = (s.flap, s.flap if s.rollout.flap is None else s.rollout.flap)
         self._ground_effect = s.ground_effect
         self._gust = s.gust
@@ -95,8 +102,9 @@ class LandingController:
             tailwind = math.nan
             flap = self._flaps[1]
         else:
-            tailwind, gust = self._gusts(memory, b, dt)
-            elevator, throttle, aileron, rudder, int_V, int_H = self._fly(memory, b, m, reference, dt, gust)
+            expected, shear = self._expected(b, m)
+            tailwind, gust = self._gusts(memory, b, dt, expected)
+            elevator, throttle, aileron, rudder, int_V, int_H = self._fly(memory, b, m, reference, dt, gust, shear)
             ground, left, right, flap = ON_TOUCHDOWN, 0.0, 0.0, self._flaps[0]
         last = memory.elevator if memory.elevator == memory.elevator else elevator
         asked = math.nan
@@ -115,19 +123,30 @@ class LandingController:
             elevator, aileron, rudder, throttle, flap, left, right, _clip(pan, most), _clip(tilt, most)
         )
 
-    def _gusts(self, memory: ControlMemory, b: Believed, dt: float) -> tuple[float, float]:
-        """Tailwind along the nose [m/s]: smoothed, and what is faster; without settings for gusts there are none."""
+    def _expected(self, b: Believed, m: Motion) -> tuple[float, float]:
+        """Tailwind along the nose [m/s] as reported, for this height, and the rate [m/s²] at which that changes."""
+        if self._reported is None:
+            return 0.0, 0.0
+        share, slope = expected_share(b.H)
+        along = self._reported[0] * math.cos(b.psi) + self._reported[1] * math.sin(b.psi)
+        return along * share, along * slope * m.H_dot
+
+    def _gusts(self, memory: ControlMemory, b: Believed, dt: float, expected: float) -> tuple[float, float]:
+        """Tailwind along the nose less what is expected [m/s]: smoothed, and what is faster; without settings, none."""
         if self._gust is None:
             return math.nan, 0.0
-        now = b.wx * math.cos(b.psi) + b.wy * math.sin(b.psi)
+        now = b.wx * math.cos(b.psi) + b.wy * math.sin(b.psi) - expected
         slow = memory.tailwind if math.isfinite(memory.tailwind) else now
         slow += dt / (dt + self._gust.filter_s) * (now - slow)
         return slow, now - slow
 
     def _fly(
-        self, memory: ControlMemory, b: Believed, m: Motion, ref: Reference, dt: float, gust: float
+        self, memory: ControlMemory, b: Believed, m: Motion, ref: Reference, dt: float, gust: float, shear: float
     ) -> tuple[float, float, float, float, float, float]:
-        """elevator [rad], throttle, aileron, rudder [rad], int_V, int_H. gust: tailwind [m/s] that will not last."""
+        """elevator [rad], throttle, aileron, rudder [rad], int_V, int_H.
+
+        gust: tailwind [m/s] that will not last; shear: rate [m/s²] of the one that does
+        """
         extra = ref.extra.get
         V = max(m.airspeed + gust, self._slowest)
         (ke_u, ke_w, ke_q, ke_th, ke_H, ke_iV, ke_iH, kt_u, kt_w, kt_q, kt_th, kt_H, kt_iV, kt_iH,
@@ -167,7 +186,7 @@ class LandingController:
         )
         thrust = (
             thrust0
-            + mass * (GRAVITY * (path - path0) + extra("acceleration", 0.0))
+            + mass * (GRAVITY * (path - path0) + extra("acceleration", 0.0) + shear)
             - (kt_u * e_u + kt_w * e_w + kt_q * e_q + kt_th * e_th + kt_H * e_H + kt_iV * int_V + kt_iH * int_H)
         )
         throttle = self._thrust.throttle(thrust, V)

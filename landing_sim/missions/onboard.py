@@ -241,6 +241,12 @@ def prepared(scenario: Scenario, vehicle: Vehicle) -> Vehicle:
     return vehicle.prepared(mass, scenario.wind.headwind_mps, _air_density(scenario), _reported_turbulence(scenario))
 
 
+def reported_wind(scenario: Scenario) -> tuple[float, float] | None:
+    """[m/s] the air's velocity along R's x and y at 33 ft, if the tower tells it."""
+    w = scenario.wind
+    return (-w.headwind_mps, w.crosswind_mps) if scenario.believed.wind_reported else None
+
+
 def control_settings(scenario: Scenario, vehicle: Vehicle) -> ControlSettings:
     c, rho, flap = vehicle.control, scenario.control.rho, scenario.aircraft.flap
     axes = {name: replace(getattr(c, name), rho=rho) for name in ("longitudinal", "lateral")}

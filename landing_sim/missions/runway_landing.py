@@ -104,6 +104,6 @@ def build(
             onboard.front_ends(scenario, camera),
             onboard.estimator(scenario, vehicle, camera, noise("believed")),
             onboard.guidance(scenario, vehicle),
-            LandingController(planned, (platform.pan, platform.tilt)),
+            LandingController(planned, (platform.pan, platform.tilt), onboard.reported_wind(scenario)),
         ),
     )

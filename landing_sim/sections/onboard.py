@@ -78,7 +78,9 @@ class Believed(Section):
         None, description="reported turbulence, as the wind at 20 ft that goes with it; null = as it is"
     )
     wind_reported: bool = Field(
-        False, description="the steady wind where the flight begins is known on board; else its prior is still air"
+        False,
+        description="the steady wind is known on board: where the flight begins, and, by the tower, at 33 ft; "
+        "else its prior is still air",
     )
     focal_scale: float = Field(1.0, ge=0.5, le=2, description="believed over true focal length")
     encoder_sigma_deg: float = Field(
