@@ -20,6 +20,19 @@ CROSSWIND = (
 )
 
 
+SHEAR = ("wind.profile={law: certification}", "believed.wind_reported=true", "wind.turbulence=null")
+
+
+@pytest.mark.parametrize("headwind", [-5.14, 10.29, 15.43])
+def test_touchdown_does_not_follow_a_headwind_that_falls_in_the_flare(headwind: float) -> None:
+    """10 kt of tailwind to 30 kt of headwind at 33 ft, of which a sixth is gone between flare and touchdown."""
+    still, windy = (fly("transport/calm", *SHEAR, f"wind.headwind_mps={w}").log.touchdown for w in (0.0, headwind))
+    assert still is not None
+    assert windy is not None
+    assert abs(windy.x - still.x) < 40.0
+    assert windy.sink_rate < 1.0
+
+
 @pytest.mark.parametrize(("warmer", "height"), [(0.0, 0.0), (40.0, 2804.0), (-69.0, -305.0)])
 def test_the_crew_knows_the_density_that_the_aircraft_flies_in(warmer: float, height: float) -> None:
     model = FlightModel(paths.aircraft_folder("transport"), 0.005, temperature_offset=warmer)

@@ -18,6 +18,7 @@ from landing_sim.control.guidance import LandingGuidance
 from landing_sim.control.landing_lq import LandingController, ThrustMap, _followed, _limited
 from landing_sim.control.rollout import Rollout, RolloutMemory
 from landing_sim.control.settings import GustSettings, RolloutSettings
+from landing_sim.control.shear import expected_share
 from landing_sim.geometry.earth import RunwayFrame
 from landing_sim.noise import Noise
 from landing_sim.plants import trim
@@ -184,6 +185,51 @@ def test_lift_lost_to_a_gust_is_answered_at_once_by_the_elevator_alone_and_what_
     unanswered = answers(replace(gust, elevator_deg_per_mps=0.0), 0.5, 120)[1]
     assert lasting.elevator == pytest.approx(unanswered.elevator, abs=1e-5)
     assert lasting.throttle - before.throttle > 0.5
+
+
+def test_a_reported_wind_is_expected_to_fall_with_the_logarithm_of_height() -> None:
+    """ln(20 / 0.0457) / ln(10.06 / 0.0457) = 6.0814 / 5.3942 = 1.1274; derivative 1 / (5.3942 x 20 m)."""
+    assert expected_share(10.06) == pytest.approx((1.0, 0.018428), rel=1e-4)
+    assert expected_share(20.0) == pytest.approx((1.1274, 0.0092692), rel=1e-4)
+    assert expected_share(0.2) == (expected_share(1.0)[0], 0.0)  # nearer to the ground there is no wing
+
+
+def test_a_headwind_that_falls_as_reported_is_no_gust() -> None:
+    """10 m/s at 33 ft, from 40 m down to 20 m at 2 m/s: 1.3 m/s less, of which an unwarned gust law answers most."""
+    _, result = do128()
+    gust = result.settings.gust
+    assert gust is not None
+
+    def last(reported: tuple[float, float] | None, per_gust: float) -> float:
+        law = replace(gust, filter_s=30.0, elevator_deg_per_mps=per_gust)
+        one = LandingController(replace(result, settings=replace(result.settings, gust=law)), reported=reported)
+        memory, c = one.init(), None
+        for k in range(101):
+            height = 40.0 - 0.2 * k
+            wx = -10.0 * expected_share(height)[0]
+            e, r = in_trim(u=result.points[0].model.state[0] + wx, wx=wx, H=height)
+            memory, c = one.step(memory, replace(e, t=0.1 * k), replace(r, height=height))
+        assert c is not None
+        return math.degrees(c.elevator)
+
+    assert last((-10.0, 0.0), 0.9) == pytest.approx(last((-10.0, 0.0), 0.0), abs=1e-6)
+    assert last(None, 0.9) < last(None, 0.0) - 0.5
+
+
+def test_engines_make_up_for_a_headwind_as_it_falls() -> None:
+    """40 m up, sinking at 2.62 m/s, 10 m/s at 33 ft fall by 10 x 2.62 / (5.3942 x 40) = 0.121 m/s², times the mass."""
+    _, result = do128()
+    m = result.points[0].model
+    e, r = in_trim()
+    told, untold = (
+        LandingController(result, reported=reported).step(LandingController(result).init(), e, r)[1].throttle
+        for reported in ((-10.0, 0.0), None)
+    )
+    thrust, V = ThrustMap(result.settings.thrust), float(np.hypot(m.state[0], m.state[2]))
+    fall = 10.0 * m.state[0] * math.sin(-m.flight_path) / (5.3942 * 40.0)
+    more = thrust.throttle(m.mass * fall, V) - thrust.throttle(0.0, V)
+    assert told - untold == pytest.approx(more, rel=0.02)
+    assert more > 0.05
 
 
 def test_decrabbed_flight_is_a_steady_sideslip() -> None:
