@@ -11,16 +11,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from landing_sim import paths
 from landing_sim import scenario as scenarios
 from landing_sim.campaign import figures, landing
 from landing_sim.campaign.file import load as load_campaign
 from landing_sim.control.autonomy import Autonomy, AutonomySettings
+from landing_sim.control.position import PositionSettings
 from landing_sim.errors import ScenarioError
 from landing_sim.estimators.readings import Reading
 from landing_sim.missions import quadrotor_eyes as eyes
 from landing_sim.missions import quadrotor_flight
-from landing_sim.missions.quadrotor_landing import Mission, build, scene
+from landing_sim.missions.quadrotor_landing import DRAG, Mission, build, scene
 from landing_sim.noise import Noise
+from landing_sim.plants.jsbsim_quadrotor import QuadrotorModel
 from landing_sim.plants.quadrotor import QuadrotorPlant
 from landing_sim.sections.quadrotor import METRICS, QuadrotorScenario
 from landing_sim.sensors.latency import Latency, LatencyConfig
@@ -43,6 +46,17 @@ def flown(name: str, *changes: str):
 
 
 # ------------------------------------------------------------------------------------------------------- flights
+
+
+def test_what_is_believed_of_the_vehicle_is_what_its_file_says() -> None:
+    folder = paths.data_folder("aircraft") / "pelican"
+    model, believed = QuadrotorModel(folder, 0.002), PositionSettings()
+    assert believed.mass == pytest.approx(model.mass, rel=1e-6)
+    assert believed.full_thrust == pytest.approx(4.0 * model.thrust_factor * model.rotor_max**2, rel=1e-3)
+    assert [contact.p_B[2] for contact in model.contacts[:4]] == pytest.approx([eyes.LEGS] * 4)
+    assert AutonomySettings().legs == eyes.LEGS
+    per_fps = float((folder / "pelican.xml").read_text().split("u-aero-fps</property><value>")[1].split("<")[0])
+    assert pytest.approx(-per_fps / 0.3048 / 0.2248089431, rel=1e-6) == DRAG
 
 
 def test_fusion_steadies_the_hover() -> None:
