@@ -9,7 +9,8 @@ from pydantic import Field
 
 from landing_sim import config, paths, yamlfile
 from landing_sim.config import Section
-from landing_sim.control.settings import ControlSettings, GuidanceSettings, SpeedSettings
+from landing_sim.control.path_settings import GuidanceSettings, SpeedSettings
+from landing_sim.control.settings import ControlSettings
 from landing_sim.control.speeds import approach_speed, at_speed, in_turbulence
 from landing_sim.errors import ConfigError, VehicleError
 from landing_sim.estimators.belief import AircraftBelief

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from landing_sim import vehicle
 from landing_sim.control.believed import believed, motion
 from landing_sim.control.guidance import Capture, GuidanceMemory, LandingGuidance, Path
-from landing_sim.control.pointing import look_along
-from landing_sim.control.settings import (
+from landing_sim.control.path_settings import (
     CaptureSettings,
     DecrabSettings,
     GearSettings,
@@ -23,6 +22,7 @@ from landing_sim.control.settings import (
     HoldOffSettings,
     PathSettings,
 )
+from landing_sim.control.pointing import look_along
 from landing_sim.control.speeds import KNOT, in_turbulence
 from landing_sim.geometry import so3
 from landing_sim.signals import Estimate, Reference

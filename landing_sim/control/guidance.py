@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from landing_sim.control.believed import Believed, Motion, moving
-from landing_sim.control.settings import GearSettings, GuidanceSettings, PathSettings
+from landing_sim.control.path_settings import GearSettings, GuidanceSettings, PathSettings
 from landing_sim.signals import Estimate, Reference
 
 GRAVITY = 9.80665

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from landing_sim.control.settings import ControlSettings, GuidanceSettings, SpeedSettings
+from landing_sim.control.path_settings import GuidanceSettings, SpeedSettings
+from landing_sim.control.settings import ControlSettings
 
 KNOT = 1852.0 / 3600.0  # [m/s]
 SEA_LEVEL_DENSITY = 1.225  # [kg/m^3]
