@@ -17,10 +17,11 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from landing_sim import config, paths, yamlfile
-from landing_sim.config import Section, inconsistent
+from landing_sim.config import inconsistent
 from landing_sim.errors import ConfigError, Location, Problem, ScenarioError, did_you_mean
 from landing_sim.sections import faults, wind
 from landing_sim.sections.faults import Fault
+from landing_sim.sections.head import Head
 from landing_sim.sections.judged import LANDING, Criterion, Record
 from landing_sim.sections.lunar import LunarScenario
 from landing_sim.sections.onboard import Believed, Control, Filter, Guidance, Observer, Vision
@@ -32,17 +33,10 @@ from landing_sim.sections.world import Aircraft, Atmosphere, Initial, Runway, Ti
 __all__ = ["MODELS", "Scenario", "Time", "dump", "load", "schema", "schema_text"]
 
 
-class Scenario(Section):
+class Scenario(Head):
     """One flight."""
 
-    schema_version: Literal[1] = Field(description="version of this format")
     mission: Literal["runway_landing"] = Field(description="what is flown")
-    name: str = Field(
-        "", max_length=100, pattern=r"^[^/\\\x00-\x1f\x7f]*$", description="short name; the file's own if left out"
-    )
-    description: str = Field("", max_length=2000, description="what it is for")
-    seed: int = Field(1, ge=0, lt=2**63, description="root of all random numbers")
-    run: int = Field(0, ge=0, lt=2**32, description="of a campaign: independent random numbers under the same seed")
     time: Time = Field(Time(), description="clock")
     aircraft: Aircraft = Field(Aircraft(), description="vehicle")
     initial: Initial = Field(Initial(), description="start of the flight")

@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 from landing_sim.config import Section, inconsistent
 from landing_sim.errors import Location
 from landing_sim.sections.bounds import NotNegative, Positive
+from landing_sim.sections.head import Head
 
 METRICS = (
     *("touchdown_x_m", "sink_rate_mps", "touchdown_groundspeed_mps", "touchdown_tilt_deg"),
@@ -94,17 +95,10 @@ class Limits(Section):
     tilt_deg: Positive = Field(10.0, description="off the vertical")
 
 
-class LunarScenario(Section):
+class LunarScenario(Head):
     """One descent."""
 
-    schema_version: Literal[1] = Field(description="version of this format")
     mission: Literal["lunar_landing"] = Field(description="what is flown")
-    name: str = Field(
-        "", max_length=100, pattern=r"^[^/\\\x00-\x1f\x7f]*$", description="short name; the file's own if left out"
-    )
-    description: str = Field("", max_length=2000, description="what it is for")
-    seed: int = Field(1, ge=0, lt=2**63, description="root of all random numbers")
-    run: int = Field(0, ge=0, lt=2**32, description="of a campaign: independent random numbers under the same seed")
     time: Clock = Field(Clock(), description="clock")
     initial: Deviation = Field(Deviation(), description="the lander's true deviation")
     believed: Deviation = Field(Deviation(), description="what is believed of it")

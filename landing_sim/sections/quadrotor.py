@@ -15,6 +15,7 @@ from landing_sim.errors import Location
 from landing_sim.sections import faults
 from landing_sim.sections.bounds import NotNegative, Positive
 from landing_sim.sections.faults import Fault
+from landing_sim.sections.head import Head
 
 Metre = Annotated[float, Field(ge=-20, le=20)]
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -200,17 +201,10 @@ class Limits(Section):
     tilt_deg: Positive = Field(10.0, description="land: off the vertical at touchdown")
 
 
-class QuadrotorScenario(Section):
+class QuadrotorScenario(Head):
     """One flight."""
 
-    schema_version: Literal[1] = Field(description="version of this format")
     mission: Literal["quadrotor_landing"] = Field(description="what is flown")
-    name: str = Field(
-        "", max_length=100, pattern=r"^[^/\\\x00-\x1f\x7f]*$", description="short name; the file's own if left out"
-    )
-    description: str = Field("", max_length=2000, description="what it is for")
-    seed: int = Field(1, ge=0, lt=2**63, description="root of all random numbers")
-    run: int = Field(0, ge=0, lt=2**32, description="of a campaign: independent random numbers under the same seed")
     task: Literal["hover", "land"] = Field("land", description="stay over the start, or find a place and land on it")
     time: Clock = Field(Clock(), description="clock")
     vehicle: Airframe = Field(Airframe(), description="the true vehicle")
