@@ -380,6 +380,17 @@ def test_unstable_approach_goes_around_and_climbs() -> None:
     assert start > 1.0
 
 
+@pytest.mark.parametrize("rise", [-0.02, 0.02])
+def test_where_an_approach_must_be_stable_is_told_from_the_threshold_not_from_its_slope_drawn_on(rise: float) -> None:
+    """500 m before it a plane of 2 % lies 10 m off: 28 m up the aircraft may still be 12 m aside, 17 m up no longer."""
+    for height, expected in ((28.0, "capture"), (17.0, "go_around")):
+        guidance = LandingGuidance(SETTINGS, math.atan(rise))
+        memory = guidance.init()
+        for i in range(30):
+            memory, reference = guidance.step(memory, estimate(i * CYCLE, x=-500.0, y=12.0, H=height + 1.8))
+        assert reference.mode == expected, height
+
+
 def test_a_short_instability_is_flown_through() -> None:
     guidance = LandingGuidance(SETTINGS)
     memory = guidance.init()

@@ -316,10 +316,11 @@ class LandingGuidance:
         ):  # no wheel bears weight: not the aircraft, the estimate is lost
             return "go_around", 0.0
         waiting = 0.0
-        if height > g.decision_height_m and mode != "acquire":
+        over = height + self.path.surface(min(wheel_x, 0.0))  # the threshold: a slope does not go on before it
+        if over > g.decision_height_m and mode != "acquire":
             if not estimate.valid and estimate.t - memory.seen > g.blackout_s:
                 return "go_around", 0.0
-            if height < g.stable_by_m and self._unstable(b, m, wheels):
+            if over < g.stable_by_m and self._unstable(b, m, wheels):
                 waiting = memory.waiting + dt
                 if waiting > g.unstable_s:
                     return "go_around", 0.0
