@@ -311,10 +311,8 @@ class LandingGuidance:
             if down or waiting >= s.touchdown_confirm_s:
                 return "rollout", 0.0
             return mode, waiting
-        if (
-            down is not None and height < -g.underground_m
-        ):  # no wheel bears weight: not the aircraft, the estimate is lost
-            return "go_around", 0.0
+        if down is not None and height < -g.underground_m:
+            return "go_around", 0.0  # no wheel bears weight: not the aircraft, the estimate is lost
         waiting = 0.0
         over = height + self.path.surface(min(wheel_x, 0.0))  # the threshold: a slope does not go on before it
         if over > g.decision_height_m and mode != "acquire":
