@@ -33,12 +33,16 @@ class FrontEndConfig:
             raise ValueError(f"platform_angle: must be 'encoder' or 'commanded', not {self.platform_angle!r}")
 
 
+SEARCHED_WHEN_LOST = 5  # one image in so many: a search takes as long as the windows of forty
+
+
 class RunwayFrontEnd:
     """interfaces.FrontEnd for the sensor "camera".
 
-    While the estimate is not valid, or says that it is lost, each image is searched for the runway: a measurement "pose"
-    (x, y, H of the cg, phi, theta, psi; R (6, 6)), or none, with `reason` telling why. Else windows are placed by
-    prediction: a measurement "edges" with R (n,) variances [px^2].
+    While the estimate is not valid each image is searched for the runway, while it says that it is lost one in
+    SEARCHED_WHEN_LOST: a measurement "pose" (x, y, H of the cg, phi, theta, psi; R (6, 6)), or none, with `reason` telling
+    why. Else windows are placed by prediction: a measurement "edges" with R (n,) variances [px^2]; where the runway is
+    lost they may still find the horizon.
 
     Holds no memory between frames but `reason`, which nothing reads back.
     """
@@ -70,7 +74,8 @@ class RunwayFrontEnd:
         data: CameraSample = sample.data
         pan, tilt = (data.pan, data.tilt) if self._encoder else (data.pan_cmd, data.tilt_cmd)
         believed = estimate()
-        if not believed.valid or believed.flags.get("lost", False):
+        lost = believed.flags.get("lost", False) and data.index % SEARCHED_WHEN_LOST == 0
+        if not believed.valid or lost:
             got = self._acquisition.acquire(data, pan, tilt)
             self.reason = got.reason
             if got.z is None or got.R is None:
