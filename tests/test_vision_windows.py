@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -413,6 +414,11 @@ def test_front_end_tracks_what_is_known_and_acquires_what_is_not() -> None:
         (acquired,) = front_end.process(sample, lambda believed=estimate: believed)
         assert acquired.kind == "pose"
         assert np.abs(acquired.z - pose) == pytest.approx(0.0, abs=5.0)
+    kinds = []
+    for index in range(10):  # lost: searched for now and then, and what is seen meanwhile is not given away
+        later = replace(sample, data=bench.sample(bench.renderer(), pose, pan, tilt, index))
+        kinds += [m.kind for m in front_end.process(later, lambda: estimate_of(pose, lost=True))]
+    assert kinds == ["pose", *["edges"] * 4] * 2
 
 
 def test_commanded_angles_are_told_where_there_are_no_encoders() -> None:
