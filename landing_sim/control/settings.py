@@ -171,7 +171,7 @@ class GustSettings:
     """Elevator against the lift that a gust along the nose gives or takes, at airspeed_mps (as 1/V² elsewhere).
 
     What is faster than the wind smoothed over filter_s is a gust, answered so and by nothing else; airspeed less gusts is
-    what is fed back and what gains and trim are scheduled over.
+    what is fed back and what gains and trim are scheduled over. How a reported wind falls towards the ground is no gust.
     """
 
     elevator_deg_per_mps: float

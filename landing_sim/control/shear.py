@@ -1,6 +1,7 @@
 """What a reported wind lets one expect at another height: it falls with the logarithm of the height over the ground.
 
-Source     MIL-F-8785C (1980), section 3.7.3.2, z0 = 0.15 ft. Towers report the wind at 33 ft.
+Source     MIL-F-8785C (1980), section 3.7.3.2, z0 = 0.15 ft. Towers report the wind at 33 ft. The true wind's laws are in
+           world/shear.py, which nothing on board may import: the air may follow another, or none.
 """
 
 from __future__ import annotations

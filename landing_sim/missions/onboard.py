@@ -242,7 +242,10 @@ def prepared(scenario: Scenario, vehicle: Vehicle) -> Vehicle:
 
 
 def reported_wind(scenario: Scenario) -> tuple[float, float] | None:
-    """[m/s] the air's velocity along R's x and y at 33 ft, if the tower tells it."""
+    """[m/s] the air's velocity along R's x and y at 33 ft, if the tower tells it.
+
+    A wind without a profile is reported as it is everywhere, and on board expected to fall towards the ground all the same.
+    """
     w = scenario.wind
     return (-w.headwind_mps, w.crosswind_mps) if scenario.believed.wind_reported else None
 

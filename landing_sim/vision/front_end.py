@@ -33,7 +33,7 @@ class FrontEndConfig:
             raise ValueError(f"platform_angle: must be 'encoder' or 'commanded', not {self.platform_angle!r}")
 
 
-SEARCHED_WHEN_LOST = 5  # one image in so many: a search takes as long as the windows of forty
+SEARCHED_WHEN_LOST = 5  # one image in so many: a search costs many times what windows do
 
 
 class RunwayFrontEnd:
