@@ -74,8 +74,8 @@ class RunwayFrontEnd:
         data: CameraSample = sample.data
         pan, tilt = (data.pan, data.tilt) if self._encoder else (data.pan_cmd, data.tilt_cmd)
         believed = estimate()
-        lost = believed.flags.get("lost", False) and data.index % SEARCHED_WHEN_LOST == 0
-        if not believed.valid or lost:
+        lost = believed.flags.get("lost", False)
+        if not believed.valid or (lost and data.index % SEARCHED_WHEN_LOST == 0):
             got = self._acquisition.acquire(data, pan, tilt)
             self.reason = got.reason
             if got.z is None or got.R is None:
