@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numba
 from numba.core import event
@@ -42,3 +42,13 @@ event.register("numba:compile", _Uncollected())
 def kernel(function: F) -> F:
     """Compile `function` with numba, cached on disk."""
     return numba.njit(cache=True, fastmath=False, error_model="numpy", no_cfunc_wrapper=True)(function)  # type: ignore[no-any-return]
+
+
+def direct(compiled: Callable[..., Any]) -> Callable[..., Any]:
+    """What calls a kernel without the dispatcher's look at the types of its arguments, half of what a small call costs.
+
+    For kernels called once a step, always with arrays of the same type and layout: these are not looked at again. The
+    kernel itself, where it has not been compiled yet, or for several types.
+    """
+    overloads = list(getattr(compiled, "overloads", {}).values())  # none where numba is switched off
+    return overloads[0].entry_point if len(overloads) == 1 else compiled

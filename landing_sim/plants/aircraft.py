@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from landing_sim.geometry import so3
 from landing_sim.geometry.earth import RunwayFrame
+from landing_sim.jit import direct
 from landing_sim.plants import motion
-from landing_sim.plants.jsbsim import FT, LBF, FlightModel, PlantError
+from landing_sim.plants.jsbsim import AIRSPEED, FT, LBF, RATES, FlightModel, PlantError
 from landing_sim.plants.trim import TrimPoint, trim
 from landing_sim.plants.wheels import Contacts, read_contacts
 from landing_sim.signals import CameraTruth, Command, Touchdown, Truth
@@ -105,6 +106,8 @@ class JsbsimPlant:
         n = len(self._contacts.names)
         self._height, self._bristle, self._pushing = np.full(n, math.inf), np.zeros((n, 2)), False
         self._body, self._tick = np.zeros((motion.ROWS, 3)), 0
+        self._forces = self._body[motion.FORCE : motion.MOMENT + 1].reshape(6)
+        self._settle_kernel: Callable[..., Any] = motion.settle
         site = np.vstack([self._frame.origin_E, self._frame.R_RE, model.cg_offset_B])
         p_B, values = self._contacts.p_B, self._contacts.values
         self._settling = (self._slope, self.dt, site, p_B, values, self._height, self._bristle, self._body)
@@ -125,7 +128,9 @@ class JsbsimPlant:
         if least < 0.0 and not s.on_ground:
             raise PlantError(f"the flight would begin {-least:.2f} m below the runway's surface: start higher")
         self._wind_N = motion.into_N(self._body, *self._wind_R0)
+        self._settle_kernel, self._into_N = direct(motion.settle), direct(motion.into_N)
         model.release(self._wind_N)
+        self._airspeed = model.airspeed_fps() * FT
         self._write(self.trimmed)
 
     def _fly(self) -> tuple[TrimPoint, Array, float, Array]:
@@ -177,9 +182,11 @@ class JsbsimPlant:
         model = self._model
         if command is not self._written:
             self._write(command)
-        self._wind_N = motion.into_N(self._body, *wind_R)
-        for write, value in zip(model.set_wind_fps, self._wind_N):
-            write(value / FT)
+        self._wind_N = north, east, down = self._into_N(self._body, *wind_R)
+        set_north, set_east, set_down = model.set_wind_fps
+        set_north(north / FT)
+        set_east(east / FT)
+        set_down(down / FT)
         self._tick += 1
         model.run()
         rates = self._settle(command)
@@ -195,14 +202,15 @@ class JsbsimPlant:
         self._model.controls(c.elevator, c.aileron, c.rudder, c.throttle, c.flap)
         self._written = command
 
-    def _settle(self, command: Command) -> list[float]:
+    def _settle(self, command: Command) -> tuple[float, ...]:
         """Take over where JSBSim has got to; tell it what lies below: terrain for the ground effect, and what the ground
         does to the wheels until the next step. Returns p, q, r [rad/s]."""
         model = self._model
-        said = [read() for read in model.motion]
-        self._x, self._y, self._H, elevation, least, finite = motion.settle(  # type: ignore[call-arg]
+        said = model.motion()
+        self._x, self._y, self._H, elevation, least, finite = self._settle_kernel(
             *said, command.brake_left, command.brake_right, *self._settling
         )
+        self._airspeed = said[AIRSPEED] * FT
         if not finite:
             raise PlantError(f"the flight model's state is not finite at t = {self._tick * self.dt:.3f} s")
         if abs(self._x) + abs(self._H) > FAR_AWAY:
@@ -210,17 +218,16 @@ class JsbsimPlant:
         model.set_terrain_ft(elevation)
         if least < 0.0 or self._pushing:
             self._push(least < 0.0)
-        return said[-3:]
+        return said[RATES:]
 
     def _push(self, touching: bool) -> None:
         """Hand the wheels' forces to JSBSim, and none once they have left the ground."""
         self._pushing = touching
         if not touching:
-            self._bristle[:] = self._body[motion.FORCE : motion.MOMENT + 1] = 0.0
+            self._bristle[:] = self._forces[:] = 0.0
         elif self._touchdown is None and not self._initial.on_ground and min(self._height[0], self._height[1]) < 0.0:
             self._touchdown = self._touch()
-        forces = self._body[motion.FORCE : motion.MOMENT + 1].ravel().tolist()
-        for write, value in zip(self._model.set_wheels_lbs, forces):
+        for write, value in zip(self._model.set_wheels_lbs, self._forces.tolist()):
             write(value)
 
     def _touch(self) -> Touchdown:
@@ -253,7 +260,7 @@ class JsbsimPlant:
         return self._touchdown
 
     def fast_truth(self) -> tuple[float, float, float, float]:
-        return self._x, self._y, self._H, self._model.airspeed_fps() * FT
+        return self._x, self._y, self._H, self._airspeed
 
     def truth(self) -> Truth:
         """Raises PlantError if JSBSim does not fly in the wind it was given."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from landing_sim.jit import kernel
+from landing_sim.jit import direct, kernel
 
 
 class PanTilt:
@@ -30,6 +30,7 @@ class PanTilt:
     """
 
     __slots__ = (
+        "_advance",
         "_lag",
         "_rate_limit",
         "_stabilisation",
@@ -75,6 +76,9 @@ class PanTilt:
         self.pan = self.pan_cmd = float(pan)
         self.tilt = self.tilt_cmd = float(tilt)
         self.pan_rate = self.tilt_rate = 0.0  # [rad/s] relative to the body
+        self._advance = _advance
+        self.step(pan, tilt, (0.0, 0.0, 0.0), 1.0)  # moves nothing: it is compiled now
+        self._advance = direct(_advance)
 
     def step(self, pan_cmd: float, tilt_cmd: float, w_RB_B: Sequence[float], dt: float) -> None:
         """Advance dt [s] towards the commanded angles [rad] while the body turns at w_RB_B: p, q, r [rad/s].
@@ -83,7 +87,7 @@ class PanTilt:
         """
         self.pan_cmd, self.tilt_cmd = pan_cmd, tilt_cmd
         p, q, r = w_RB_B
-        self.pan, self.tilt, self.pan_rate, self.tilt_rate = _advance(
+        self.pan, self.tilt, self.pan_rate, self.tilt_rate = self._advance(
             self.pan, self.tilt, pan_cmd, tilt_cmd, p, q, r, dt,
             self._lag, self._rate_limit, self._stabilisation, self.pan_limit, self.tilt_limit,
         )  # fmt: skip

@@ -148,6 +148,10 @@ def borders(
     best, heading, left, right = 0.0, 0.0, 0.0, 0.0
     cs, ss = math.cos(slope), math.sin(slope)
     where, depth = np.empty(n), np.empty(n)
+    ray, steep = np.empty((n, 2)), np.empty(n)
+    for i in range(n):
+        ray[i, 0], ray[i, 1] = (points[i, 0] - lens[1]) / lens[0], (points[i, 1] - lens[2]) / lens[0]
+        steep[i] = points[i, 2] ** 2 + points[i, 3] ** 2
     y, w = np.empty(3), np.empty(3)
     for t in range(len(headings)):
         ca, sa = math.cos(headings[t]), math.sin(headings[t])
@@ -158,13 +162,13 @@ def borders(
         total, m = 0.0, 0
         for i in range(n):
             where[i] = math.nan
-            a, b = (points[i, 0] - lens[1]) / lens[0], (points[i, 1] - lens[2]) / lens[0]
+            a, b = ray[i, 0], ray[i, 1]
             p, q = y[0] * a + y[1] * b + y[2], w[0] * a + w[1] * b + w[2]
             if q <= 1e-3:  # above or at the horizon
                 continue
             du, dv = y[0] * q - p * w[0], y[1] * q - p * w[1]  # gradient of K, up to scale
             along = du * points[i, 2] + dv * points[i, 3]
-            if along * along < 0.85 * (du * du + dv * dv) * (points[i, 2] ** 2 + points[i, 3] ** 2):
+            if along * along < 0.85 * (du * du + dv * dv) * steep[i]:
                 continue
             # p / (|p| + q) grows with K from -1 to 1; falling edges are set off by 3
             where[i] = p / (abs(p) + q) + (1.0 if along * polarity > 0.0 else 4.0)
@@ -182,9 +186,12 @@ def borders(
                 sums[falls, 0, k] += 1.0
                 sums[falls, 1, k] += depth[i]
                 sums[falls, 2, k] += depth[i] * depth[i]
+        most = 0.0  # that any right border may have
+        for j in range(2, bins + 1):
+            most = max(most, sums[1, 0, j - 1] + sums[1, 0, j] + sums[1, 0, j + 1])
         for i in range(1, bins + 1):
             L = _votes(sums[0], i, limits[3])
-            if L * m <= best * best or abs(_tangent(i, bins)) > limits[2]:
+            if L * most <= best * best or abs(_tangent(i, bins)) > limits[2]:
                 continue
             for j in range(i + 1, bins + 1):
                 if L * (sums[1, 0, j - 1] + sums[1, 0, j] + sums[1, 0, j + 1]) <= best * best:

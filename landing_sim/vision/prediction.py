@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from landing_sim.geometry.runway_edge import crossing, turning_axes
 from landing_sim.geometry.runway_image import HORIZON, LEFT, RIGHT, THRESHOLD, Vector, displacement, line_of, plane
 from landing_sim.geometry.so3 import camera_from_body, from_euler
 from landing_sim.jit import kernel
@@ -151,7 +152,11 @@ def look(sight: Array, lever: Array, lens: Array, frame: Array, length: float, s
 def jacobian(
     feature: np.ndarray, centre: Array, direction: Array, sight: Array, lever: Array, lens: Array, slope: float
 ) -> tuple[Array, Array]:
-    """Predicted displacements h (n,) [px] and dh/dsight (n, 9) by central differences."""
+    """Predicted displacements h (n,) [px] and dh/dsight (n, 9) by central differences.
+
+    Of the placing itself, so with the azimuth at which the horizon is looked at; `spread`, which is asked in every frame,
+    takes the closed form.
+    """
     n = len(feature)
     h, J = np.empty(n), np.empty((n, 9))
     p, R = camera_pose(sight, lever)
@@ -207,12 +212,14 @@ def spread(view: View, sight: Array, cov: Array, lever: Array, extra: float) -> 
     The places: the visible ends of a borderline, the corners for the threshold, and for the horizon (or whatever is not in
     view) left and right of the centre. `extra` [px] is added in quadrature.
     """
-    feature, centre, direction = np.empty(8, dtype=np.int64), np.empty((8, 2)), np.empty((8, 2))
+    R_RB, axes, J = (
+        from_euler(sight[3], sight[4], sight[5]),
+        turning_axes(sight[3], sight[4], sight[PAN]),
+        np.empty((8, 9)),
+    )
     for i in range(8):
         side, which = i // 2, i % 2
-        feature[i] = side
-        direction[i, 0], direction[i, 1] = view.lines[side, 0], view.lines[side, 1]
-        centre[i, 0], centre[i, 1] = view.lens[1] + (which - 0.5) * 0.8 * view.frame[0], view.lens[2]
+        u, v = view.lens[1] + (which - 0.5) * 0.8 * view.frame[0], view.lens[2]
         q = np.zeros(3)
         if side in (LEFT, RIGHT):
             q0 = view.threshold + (side - 0.5) * view.width * view.across
@@ -222,13 +229,18 @@ def spread(view: View, sight: Array, cov: Array, lever: Array, extra: float) -> 
         elif side == THRESHOLD:
             q = view.threshold + (which - 0.5) * view.width * view.across
         if q[2] >= 0.5 * NEAR:
-            centre[i, 0], centre[i, 1] = q[0] / q[2], q[1] / q[2]
-    _, J = jacobian(feature, centre, direction, sight, lever, view.lens, view.slope)
+            u, v = q[0] / q[2], q[1] / q[2]
+        crossing(
+            side, u, v, view.lines[side, 0], view.lines[side, 1], view.p_RC, view.R_CR, R_RB, axes, lever, view.lens,
+            view.width, view.slope, J, i,
+        )  # fmt: skip
     sigma = np.zeros(4)
     for i in range(8):
         var = extra * extra
         for j in range(9):
+            along = 0.0
             for k in range(9):
-                var += J[i, j] * cov[j, k] * J[i, k]
+                along += cov[j, k] * J[i, k]
+            var += J[i, j] * along
         sigma[i // 2] = max(sigma[i // 2], math.sqrt(max(0.0, var)))
     return sigma
