@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 __all__ = ["Recorder", "ReplayError", "Scene", "events", "open_viewer", "record_log"]
 
 OTHER_COLOUR = (120, 150, 255)
-TOGETHER = 32  # images sent at once
+TOGETHER = 256  # images sent at once
 FEATURES, STATUSES = overlay.packed(overlay.FEATURE_COLOURS), overlay.packed(overlay.STATUS_COLOURS)
 
 
@@ -246,7 +246,7 @@ def record_other(stream: rr.RecordingStream, log: FlightLog) -> None:
 def _jpeg(pixels: np.ndarray) -> bytes:
     import cv2
 
-    ok, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, 75])
+    ok, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, 60])
     if not ok:
         raise ReplayError(f"cannot encode an image of shape {pixels.shape}")
     return bytes(data)

@@ -31,7 +31,7 @@ CUT = 4.0  # [sigma] half width of an edge's profile
 TABLE_HALF = 512
 TABLE_SIZE = 2 * TABLE_HALF
 SLACK = 1e-6  # table units: covers rounding when a whole block is classified at once
-TILE = 64, 32  # [px] width and height of the blocks that a full frame is made of
+TILE = 128, 16  # [px] width and height of the blocks that a full frame is made of
 FAR = 1 << 20  # [px] outside every image
 CULL_MARGIN = 64.0  # [px] around the image outside which a quadrilateral is dropped
 
@@ -224,9 +224,11 @@ def _draw_horizon(
             for c in range(w):
                 block[r, c] = palette[side]
             continue
-        for c in range(w):
+        for c in range(w):  # two loops: the roots and quotients of this one are taken several at a time
             value, gu, gv = _dip_function(float(u0 + c), float(v), horizon, camera)
-            beyond = _beyond(value * (units / max(math.sqrt(gu * gu + gv * gv), 1e-30)) + TABLE_HALF, table)
+            block[r, c] = value * (units / max(math.sqrt(gu * gu + gv * gv), 1e-30)) + TABLE_HALF
+        for c in range(w):
+            beyond = _beyond(block[r, c], table)
             block[r, c] = (1.0 - beyond) * ground + beyond * sky
 
 
