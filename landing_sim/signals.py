@@ -17,12 +17,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from landing_sim.records import record
 from landing_sim.types import Array
 
 # --------------------------------------------------------------------------------------------- truth side
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Truth:
     """State of the world at one tick. Only plant, world, sensors, the log and the judge may see it."""
 
@@ -60,7 +61,7 @@ class Touchdown:
     sideslip: float
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class CameraTruth:
     """Where the camera really is when a frame is exposed."""
 
@@ -73,7 +74,7 @@ class CameraTruth:
 # --------------------------------------------------------------------------------------------- between the sides
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Command:
     """What the onboard side asks of the aircraft and of the camera platform."""
 
@@ -108,7 +109,7 @@ class Frame(Protocol):
         """(height, width) uint8: the same pixels as the windows."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Sample:
     """One reading of one sensor: valid at t_valid, in the computer's hands at t_arrival."""
 
@@ -119,7 +120,7 @@ class Sample:
     data: Any  # a faulted sensor sends nothing
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class CameraSample:
     """A frame together with what the platform's encoders said when it was exposed."""
 
@@ -173,7 +174,7 @@ class Status(IntEnum):
     REJECTED = 6  # set by the estimator's gate
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class EdgeSet:
     """The windows of one image: where they were put and what they were meant to find.
 
@@ -189,7 +190,7 @@ class EdgeSet:
     tilt: float
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Measurement:
     """What a front end or an inertial sensor tells the estimator.
 
@@ -209,7 +210,7 @@ class Measurement:
     geometry: EdgeSet | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Residuals:
     """What the estimator made of its last "edges" measurement."""
 
@@ -219,7 +220,7 @@ class Residuals:
     dof: int
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Estimate:
     """What is believed at time t. `valid` is False until the runway has been acquired.
 
@@ -242,7 +243,7 @@ class Estimate:
         return float(self.mean[self.names.index(name)]) if name in self.names else default
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Reference:
     """What guidance asks of the controller.
 
@@ -263,7 +264,7 @@ class Reference:
     extra: Mapping[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Step:
     """One control cycle, as yielded by the loop: everything a log, a replay or a judge needs."""
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
+from operator import itemgetter
 from typing import NamedTuple
-
-import numpy as np
 
 from landing_sim.signals import Estimate
 
@@ -47,21 +47,21 @@ class Motion(NamedTuple):
 
 
 @lru_cache(maxsize=16)
-def _positions(names: tuple[str, ...]) -> np.ndarray:
+def _picked(names: tuple[str, ...]) -> Callable[[list[float]], tuple[float, ...]]:
     missing = [name for name in NAMES if name not in names and name not in _WIND]
     if missing:
         raise ValueError(f"the controller needs {', '.join(missing)} in the estimate, which names {', '.join(names)}")
-    return np.array([names.index(name) for name in NAMES if name in names])
+    return itemgetter(*[names.index(name) for name in NAMES if name in names])
 
 
 def believed(estimate: Estimate) -> Believed:
     """Raises     ValueError if a state other than the wind is not estimated."""
-    values = estimate.mean[_positions(estimate.names)].tolist()
-    return Believed(*values) if len(values) == len(NAMES) else Believed(*_with_wind(estimate, values))
+    values = _picked(estimate.names)(estimate.mean.tolist())
+    return Believed._make(values if len(values) == len(NAMES) else _with_wind(estimate, values))
 
 
-def _with_wind(estimate: Estimate, values: list[float]) -> list[float]:
-    return values[:12] + [estimate.get(name, 0.0) for name in _WIND]
+def _with_wind(estimate: Estimate, values: tuple[float, ...]) -> tuple[float, ...]:
+    return (*values[:12], *(estimate.get(name, 0.0) for name in _WIND))
 
 
 def moving(estimate: Estimate) -> tuple[Believed, Motion]:

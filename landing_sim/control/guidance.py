@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 from landing_sim.control.believed import Believed, Motion, moving
 from landing_sim.control.path_settings import GearSettings, GuidanceSettings, PathSettings
+from landing_sim.records import record
 from landing_sim.signals import Estimate, Reference
 
 GRAVITY = 9.80665
@@ -23,7 +24,7 @@ MOST_DRAUGHT = 10.0  # [m/s] that attitude is corrected for: what is beyond is a
 AIRBORNE = ("acquire", "hold", "capture", "glide", "flare", "decrab")
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class GuidanceMemory:
     """Phase of flight and what it remembers."""
 

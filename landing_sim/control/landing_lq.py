@@ -24,13 +24,14 @@ from landing_sim.control.rollout import Rollout, RolloutMemory
 from landing_sim.control.settings import ThrustSettings
 from landing_sim.control.shear import expected_share
 from landing_sim.control.tables import Schedule, interpolate
+from landing_sim.records import record
 from landing_sim.signals import Command, Estimate, Reference
 
 GRAVITY = 9.80665
 ON_TOUCHDOWN = RolloutMemory()
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ControlMemory:
     """Integrals and the commands of the last cycle, from which rates are limited."""
 

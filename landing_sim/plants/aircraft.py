@@ -265,10 +265,8 @@ class JsbsimPlant:
     def truth(self) -> Truth:
         """Raises PlantError if JSBSim does not fly in the wind it was given."""
         model = self._model
-        model.check_wind(self._wind_N)
         body = self._body.copy()
-        north, east, down = [read() * FT for read in model.wind_fps]
-        motion.look(body, north, east, down)
+        motion.look(body, *model.check_wind(self._wind_N))
         height = body[motion.WHEELS]
         return Truth(
             tick=self._tick,

@@ -254,13 +254,19 @@ class FlightModel:
         fdm.set_sim_time(0.0)
         self.check_wind(wind_N)
 
-    def check_wind(self, wind_N: Sequence[float]) -> None:
-        """Raises PlantError if JSBSim flies in another wind than wind_N (3,) [m/s], or adds turbulence of its own."""
+    def check_wind(self, wind_N: Sequence[float]) -> tuple[float, float, float]:
+        """The wind [m/s] JSBSim flies in, north, east, down.
+
+        Raises PlantError if it is another than wind_N (3,) [m/s], or if JSBSim adds turbulence of its own.
+        """
         if self.turbulence() != 0.0:
             raise PlantError(f"atmosphere/turb-type is {self.turbulence():g}: the wind is ours, JSBSim must add none")
-        for read, value in zip(self.wind_fps, wind_N):
-            if not abs(read() * FT - value) < 1e-6:
-                raise PlantError(f"JSBSim lost the wind: {read() * FT:.6f} m/s instead of {value:.6f}")
+        north, east, down = self.wind_fps
+        told = north() * FT, east() * FT, down() * FT
+        for read, value in zip(told, wind_N):
+            if not abs(read - value) < 1e-6:
+                raise PlantError(f"JSBSim lost the wind: {read:.6f} m/s instead of {value:.6f}")
+        return told
 
     def accelerations(self) -> tuple[Array, float]:
         """(6,) du dv dw [m/s^2] dp dq dr [rad/s^2] in the placed state, and thrust [N]."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from landing_sim.records import record
 from landing_sim.signals import Frame
 from landing_sim.types import Array
 from landing_sim.vision import layout as col
@@ -92,7 +93,7 @@ class EdgeConfig:
     floor: float = 0.01
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Windows:
     """Windows as placed: rows of F (n, 12) and I (n, 11), see `layout`, all of size width x height [px]."""
 
