@@ -19,6 +19,7 @@ from landing_sim.geometry.pinhole import Intrinsics, project
 from landing_sim.geometry.so3 import camera_from_body, from_euler
 from landing_sim.record import judge, overlay, parquet, replay
 from landing_sim.record.log import FlightLog, LogBuilder, LogError
+from landing_sim.record.poses import quaternions
 from landing_sim.signals import Estimate, Feature, Residuals, Status, Touchdown
 
 RUNWAY = {"width_m": 29.0, "length_m": 1680.0}
@@ -474,6 +475,25 @@ def test_recorded_error_and_band_are_the_log_s(recording):
     np.testing.assert_allclose(values[:, 0], log.error("y")[known])
     np.testing.assert_allclose(values[:, 1], 3.0 * log.sigma("y")[known])
     np.testing.assert_allclose(values[:, 2], -values[:, 1])
+
+
+def test_quaternions_turn_as_their_matrices_do():
+    """Half turns as well, where the scalar part is zero."""
+    rng = np.random.default_rng(3)
+    axes = rng.normal(size=(200, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    axes[:3] = np.eye(3)
+    angles = np.concatenate([np.full(20, np.pi), rng.uniform(-np.pi, np.pi, 180)])
+    c, s = np.cos(angles), np.sin(angles)
+    skew = np.cross(np.eye(3)[None], axes[:, None]).swapaxes(1, 2) * -1.0
+    R = (
+        c[:, None, None] * np.eye(3)
+        + s[:, None, None] * skew
+        + (1.0 - c)[:, None, None] * axes[:, :, None] * axes[:, None]
+    )
+    wanted = np.column_stack([np.sin(angles / 2.0)[:, None] * axes, np.cos(angles / 2.0)])
+    found = quaternions(R)
+    assert np.abs(np.abs(np.sum(found * wanted, axis=1)) - 1.0).max() < 1e-12
 
 
 def test_events_tell_the_story(log):

@@ -13,6 +13,7 @@ import numpy as np
 
 from landing_sim.geometry.so3 import from_euler
 from landing_sim.record.log import FlightLog
+from landing_sim.record.poses import poses
 from landing_sim.record.stage import ESTIMATE_COLOUR, TIMELINE, TRUE_COLOUR, mesh, rerun
 from landing_sim.record.viewer import ReplayError, start_live_viewer
 from landing_sim.types import Array
@@ -137,7 +138,7 @@ def _record(stream: Any, log: FlightLog, angles: tuple[float, ...]) -> None:
 
     p = np.column_stack([log["true_x_m"], log["true_y_m"], log["true_z_m"]])
     R_RB = np.stack([from_euler(*e) for e in zip(log["true_phi_rad"], log["true_theta_rad"], log["true_psi_rad"])])
-    stream.send_columns("world/lander", times(slice(None)), rr.Transform3D.columns(translation=p, mat3x3=R_RB))
+    stream.send_columns("world/lander", times(slice(None)), poses(p, R_RB))
     stream.log("world/path", rr.LineStrips3D([p], colors=TRUE_COLOUR, radii=rr.Radius.ui_points(1.5)), static=True)
     nothing = np.full(len(t), np.nan)
     states = {

@@ -15,6 +15,7 @@ import numpy as np
 
 from landing_sim.geometry.so3 import from_euler
 from landing_sim.record.log import FlightLog
+from landing_sim.record.poses import poses
 from landing_sim.record.stage import BAND_COLOUR, ESTIMATE_COLOUR, TIMELINE, TRUE_COLOUR, mesh, rerun
 from landing_sim.record.viewer import ReplayError, start_live_viewer
 from landing_sim.types import Array
@@ -173,7 +174,7 @@ def _record(stream: Any, log: FlightLog) -> None:
     p = np.column_stack([log["true_x_m"], log["true_y_m"], log["true_z_m"]])
     some = slice(None, None, EVERY)
     R_RB = [from_euler(*e) for e in zip(log["true_phi_rad"], log["true_theta_rad"], log["true_psi_rad"])][some]
-    columns = rr.Transform3D.columns(translation=p[some], mat3x3=np.stack(R_RB))
+    columns = poses(p[some], R_RB)
     stream.send_columns("world/vehicle", times(some), columns)
     flying = ~np.isin(log["mode"], ("wait", "cut"))
     wanted = np.column_stack([log["ref_x"], log["ref_y_m"], -log["ref_height_m"]])
@@ -185,7 +186,7 @@ def _record(stream: Any, log: FlightLog) -> None:
     if len(known) > 1:
         line("estimated", believed[known], ESTIMATE_COLOUR, 1.2)
         R_said = [from_euler(*(log.estimate(a)[k] for a in ("phi", "theta", "psi"))) for k in known]
-        columns = rr.Transform3D.columns(translation=believed[known], mat3x3=np.stack(R_said))
+        columns = poses(believed[known], R_said)
         stream.send_columns("world/believed", times(known), columns)
     for i, (axis, _) in enumerate(AXES):
         sign = -1.0 if axis == "H" else 1.0

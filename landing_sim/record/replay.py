@@ -19,6 +19,7 @@ from landing_sim.geometry.so3 import camera_from_body, from_euler
 from landing_sim.record import overlay, shapes
 from landing_sim.record.channels import ERRORS, RANGING, SERIES, events
 from landing_sim.record.log import FlightLog
+from landing_sim.record.poses import poses
 from landing_sim.record.sights import record_sights
 from landing_sim.record.stage import (
     ESTIMATE_COLOUR,
@@ -184,10 +185,10 @@ def record_log(stream: rr.RecordingStream, log: FlightLog) -> None:
     p = np.column_stack([log["true_x_m"], log["true_y_m"], log["true_z_m"]])
     R_RB = [from_euler(*e) for e in zip(log["true_phi_rad"], log["true_theta_rad"], log["true_psi_rad"])]
     p_camera = np.column_stack([log["true_camera_x_m"], log["true_camera_y_m"], log["true_camera_z_m"]])
-    R_RC = [R @ camera_from_body(pan, tilt).T for R, pan, tilt in zip(R_RB, log["true_pan_rad"], log["true_tilt_rad"])]
+    R_CB = [camera_from_body(pan, tilt) for pan, tilt in zip(log["true_pan_rad"], log["true_tilt_rad"])]
+    R_RC = np.stack(R_RB) @ np.stack(R_CB).swapaxes(1, 2)
     for entity, position, rotations in (("world/aircraft", p, R_RB), ("world/camera", p_camera, R_RC)):
-        columns = rr.Transform3D.columns(translation=position, mat3x3=np.stack(rotations))
-        stream.send_columns(entity, times(everything), columns)
+        stream.send_columns(entity, times(everything), poses(position, rotations))
     stream.log("world/path/true", rr.LineStrips3D([p], colors=TRUE_COLOUR, radii=rr.Radius.ui_points(1.5)), static=True)
     ground = np.column_stack([p[:, :2], np.full(len(p), -0.6)])
     stream.log(
@@ -231,7 +232,7 @@ def record_other(stream: rr.RecordingStream, log: FlightLog) -> None:
     times = [rr.TimeColumn(TIMELINE, duration=log["t_s"])]
     p = np.column_stack([log["true_x_m"], log["true_y_m"], log["true_z_m"]])
     R_RB = [from_euler(*e) for e in zip(log["true_phi_rad"], log["true_theta_rad"], log["true_psi_rad"])]
-    stream.send_columns("world/other", times, rr.Transform3D.columns(translation=p, mat3x3=np.stack(R_RB)))
+    stream.send_columns("world/other", times, poses(p, R_RB))
     path = rr.LineStrips3D([p], colors=OTHER_COLOUR, radii=rr.Radius.ui_points(1.5))
     stream.log("world/path/other", path, static=True)
     for entity, _, series in SERIES:
