@@ -77,7 +77,9 @@ def horizon_line(points: Array, width: int, height: int, max_roll: float, share:
     n_bins = int((height + 2.0 * width * math.tan(max_roll)) / step) + 2
     low = -width * math.tan(max_roll)
     a = b = 0.0
-    votes = np.zeros((n_roll, n_bins), dtype=np.uint64)
+    votes, slopes = np.zeros((n_roll, n_bins), dtype=np.uint64), np.empty(n_roll)
+    for r in range(n_roll):
+        slopes[r] = math.tan((r - n_roll // 2) * 0.004)
     for i in range(len(points)):
         u, v, gu, gv = points[i]
         if gv >= 0.0:
@@ -85,14 +87,14 @@ def horizon_line(points: Array, width: int, height: int, max_roll: float, share:
         column = np.uint64(1) << np.uint64(int(64.0 * u / width))
         centre = -gu / gv  # slope of the edge there: only rolls near it are voted for
         for r in range(n_roll):
-            slope = math.tan((r - n_roll // 2) * 0.004)
+            slope = slopes[r]
             if abs(slope - centre) < 0.25:
                 votes[r, int((v - slope * u - low) / step)] |= column
     best_span, limit = 0, np.inf
     while True:  # the longest line, then any nearly as long one clearly above it
         longest, best_v = 0, 0.0
         for r in range(n_roll):
-            slope = math.tan((r - n_roll // 2) * 0.004)
+            slope = slopes[r]
             for k in range(n_bins - 1):
                 v = low + (k + 1.0) * step + slope * 0.5 * width
                 if v < limit - 12.0:
@@ -147,11 +149,12 @@ def borders(
     sums = np.zeros((2, 3, _BINS + 2))  # by polarity and bin: number of points, sum of depths and of their squares
     best, heading, left, right = 0.0, 0.0, 0.0, 0.0
     cs, ss = math.cos(slope), math.sin(slope)
-    where, depth = np.empty(n), np.empty(n)
-    ray, steep = np.empty((n, 2)), np.empty(n)
+    where, depth, far = np.empty(n), np.empty(n), np.empty(n)
+    ray_u, ray_v, g_u, g_v, steep = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     for i in range(n):
-        ray[i, 0], ray[i, 1] = (points[i, 0] - lens[1]) / lens[0], (points[i, 1] - lens[2]) / lens[0]
-        steep[i] = points[i, 2] ** 2 + points[i, 3] ** 2
+        ray_u[i], ray_v[i] = (points[i, 0] - lens[1]) / lens[0], (points[i, 1] - lens[2]) / lens[0]
+        g_u[i], g_v[i] = points[i, 2], points[i, 3]
+        steep[i] = g_u[i] ** 2 + g_v[i] ** 2
     y, w = np.empty(3), np.empty(3)
     for t in range(len(headings)):
         ca, sa = math.cos(headings[t]), math.sin(headings[t])
@@ -159,22 +162,21 @@ def borders(
             x_c = ca * R_LC[0, c] + sa * R_LC[1, c]
             y[c] = -sa * R_LC[0, c] + ca * R_LC[1, c]
             w[c] = ss * x_c + cs * R_LC[2, c]
+        for i in range(n):  # without a branch, so that several points are taken at a time
+            a, b = ray_u[i], ray_v[i]
+            p, q = y[0] * a + y[1] * b + y[2], w[0] * a + w[1] * b + w[2]
+            du, dv = y[0] * q - p * w[0], y[1] * q - p * w[1]  # gradient of K, up to scale
+            along = du * g_u[i] + dv * g_v[i]
+            runs_along = along * along >= 0.85 * (du * du + dv * dv) * steep[i]
+            # p / (|p| + q) grows with K from -1 to 1; falling edges are set off by 3
+            at = p / (abs(p) + q) + (1.0 if along * polarity > 0.0 else 4.0)
+            where[i] = at if (q > 1e-3) & runs_along else math.nan  # at the horizon and above there is no ground
+            depth[i], far[i] = q, math.sqrt(p * p + q * q)
         total, m = 0.0, 0
         for i in range(n):
-            where[i] = math.nan
-            a, b = ray[i, 0], ray[i, 1]
-            p, q = y[0] * a + y[1] * b + y[2], w[0] * a + w[1] * b + w[2]
-            if q <= 1e-3:  # above or at the horizon
-                continue
-            du, dv = y[0] * q - p * w[0], y[1] * q - p * w[1]  # gradient of K, up to scale
-            along = du * points[i, 2] + dv * points[i, 3]
-            if along * along < 0.85 * (du * du + dv * dv) * steep[i]:
-                continue
-            # p / (|p| + q) grows with K from -1 to 1; falling edges are set off by 3
-            where[i] = p / (abs(p) + q) + (1.0 if along * polarity > 0.0 else 4.0)
-            depth[i] = q
-            total += math.sqrt(p * p + q * q)
-            m += 1
+            if where[i] == where[i]:
+                total += far[i]
+                m += 1
         if m == 0:
             continue
         bins = min(_BINS, max(90, int(2.0 * lens[0] * total / m / _BIN)))
