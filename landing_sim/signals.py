@@ -222,7 +222,8 @@ class Residuals:
 
 @record
 class Estimate:
-    """What is believed at time t. `valid` is False until the runway has been acquired.
+    """What is believed at time t. `valid` is False until the runway has been acquired; what gyros and airspeed tell may
+    stand in p q r, phi, theta, u, w even so, all else means nothing.
 
     Names used by all aircraft estimators: u v w [m/s] INERTIAL velocity in body axes; p q r [rad/s]; phi theta psi
     [rad]; x y H [m] cg in R with H = -z; wx wy wz [m/s] wind in R; bp bq br [rad/s] gyro bias; W [m] runway width.

@@ -19,13 +19,13 @@ import landing_sim
 ROOT = Path(landing_sim.__file__).parent
 TRUTH = {"world", "plants", "sensors"}
 ONBOARD = {"vision", "estimators", "control"}
-ANYONE = {"signals", "geometry", "noise", "jit", "types"}
+ANYONE = {"signals", "geometry", "noise", "jit", "records", "types"}
 # Only these may name concrete parts of both sides.
 JOINERS = {"missions", "cli"}
 ALLOWED_OURS = {
     "geometry": {"geometry", "jit", "types"},
     "loop": {"signals", "interfaces"},
-    "signals": {"geometry", "types"},
+    "signals": {"geometry", "records", "types"},
     "interfaces": ANYONE,
     "record": ANYONE | {"record"},
     **{part: ANYONE | TRUTH | {"interfaces"} for part in TRUTH},

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import filter_bench as bench
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from landing_sim.estimators.belief import AircraftBelief
 from landing_sim.estimators.edge_model import edge_model
 from landing_sim.estimators.gusts import change as gusts_change
 from landing_sim.estimators.inertial_model import airspeed_model, gyro_model
+from landing_sim.estimators.reckoning import reckoned
 from landing_sim.estimators.rewind import Rewind
 from landing_sim.estimators.runway_filter import Blocks, FilterConfig
 from landing_sim.geometry.runway_image import image_line, plane_normal
@@ -455,3 +458,22 @@ def test_rewind_splits_a_prediction_where_a_measurement_falls_between() -> None:
     assert [round(e.t, 3) for e in memory] == [0.0, 0.0, 0.03, 0.03, 0.06]
     at = late.read(memory, 0.045)
     assert at.t == pytest.approx(0.045)
+
+
+def test_reckoned_attitude_by_hand() -> None:
+    """A roll is integrated; a gyro that lies about the roll ends where the turn says; a turn is a bank."""
+    x = np.zeros(states.N)
+    x = reckoned(x, np.array([0.1, 0.02, 0.0]), 60.0, 0.5)
+    assert x[states.PHI] == pytest.approx(0.05) and x[states.THETA] == pytest.approx(0.01)
+    assert x[[states.P, states.Q, states.R, states.U]].tolist() == [0.1, 0.02, 0.0, 60.0]
+    lies = np.zeros(states.N)
+    for _ in range(4000):
+        lies = reckoned(lies, np.array([math.radians(0.1), 0.0, 0.0]), 60.0, 0.04)
+    assert math.degrees(lies[states.PHI]) == pytest.approx(1.5, abs=0.01)  # bias times 15 s
+    # a level turn of 20 deg of bank: its rate splits into q and r
+    phi, V = math.radians(20.0), 60.0
+    rate = 9.80665 * math.tan(phi) / V
+    banked = np.zeros(states.N)
+    for _ in range(4000):
+        banked = reckoned(banked, np.array([0.0, rate * math.sin(phi), rate * math.cos(phi)]), V, 0.04)
+    assert math.degrees(banked[states.PHI]) == pytest.approx(20.0, abs=0.1)

@@ -98,6 +98,20 @@ def test_an_approach_that_never_finds_the_runway_climbs_away() -> None:
     assert log["true_H_m"][-1] > 60.0
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_who_never_sees_the_runway_climbs_away_with_wings_level(seed: int) -> None:
+    """In turbulence, from gyros and airspeed alone, until it has flown past the place where the runway must be."""
+    flight = fly(
+        "transport/turbulence", "faults=[{sensor: camera, kind: off, start_s: 0}]", "time.limit_s=150", seed=seed
+    )
+    log = flight.log
+    assert flight.verdict.outcome == "go_around"
+    assert not log["valid"].any()
+    assert np.degrees(np.abs(log["true_phi_rad"])).max() < 15.0
+    assert log["true_H_m"].min() > 200.0 and log["true_H_m"][-1] > 600.0
+    assert log["true_airspeed_mps"].min() > 50.0 and log["true_airspeed_mps"].max() < 95.0
+
+
 def test_a_flight_model_that_gives_up_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(self: object, command: object, wind_R: object) -> None:
         raise PlantError("the flight model's state is not finite")

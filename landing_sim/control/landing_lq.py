@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from landing_sim.control.believed import Believed, Motion, moving
+from landing_sim.control.blind_climb import climb
 from landing_sim.control.design import Design, PointDesign
 from landing_sim.control.pointing import look_along
 from landing_sim.control.rollout import Rollout, RolloutMemory
@@ -84,7 +85,8 @@ class LandingController:
 
     def step(self, memory: ControlMemory, estimate: Estimate, reference: Reference) -> tuple[ControlMemory, Command]:
         elevation, most = self._camera
-        if reference.mode == "acquire" or "blind" in reference.extra:
+        blind = "blind" in reference.extra
+        if reference.mode == "acquire" or (blind and not estimate.get("u") > 0.0):
             # nothing to fly by: the trim it began in, or with full power a blind climb
             elevator, throttle = self._trim
             throttle = 1.0 if reference.mode == "go_around" else throttle
@@ -92,9 +94,16 @@ class LandingController:
                 elevator, 0.0, 0.0, throttle, self._flaps[0], 0.0, 0.0, *self._look
             )
         b, m = moving(estimate)
-        pan, tilt = look_along(b.phi, b.theta, b.psi, 0.0, elevation)
+        pan, tilt = self._look if blind else look_along(b.phi, b.theta, b.psi, 0.0, elevation)
         dt = min(max(estimate.t - memory.t, 0.0), 0.5)
-        if reference.mode == "rollout" or reference.mode == "stopped":
+        if blind:
+            V = max(b.u, self._slowest)
+            elevator, aileron, rudder, int_V = climb(
+                self._schedule(V), V, b, b.u - reference.airspeed, memory.int_V, dt
+            )
+            throttle, int_H, tailwind = 1.0, 0.0, math.nan
+            ground, left, right, flap = ON_TOUCHDOWN, 0.0, 0.0, self._flaps[0]
+        elif reference.mode == "rollout" or reference.mode == "stopped":
             ground = memory.rollout
             if memory.mode not in ("rollout", "stopped"):
                 ground = RolloutMemory(b.theta, memory.elevator if math.isfinite(memory.elevator) else 0.0)

@@ -21,6 +21,7 @@ from landing_sim.estimators.aircraft_model import downwash, parameters, thrust
 from landing_sim.estimators.belief import AircraftBelief
 from landing_sim.estimators.gusts import change
 from landing_sim.estimators.inertial_model import airspeed_model, gyro_model
+from landing_sim.estimators.reckoning import reckoned
 from landing_sim.estimators.runway_filter import RAD, Blocks, FilterConfig, Memory
 from landing_sim.estimators.runway_steps import (
     airspeed_dense,
@@ -101,14 +102,15 @@ class RunwayEkf:
         return Memory(t, False, x, np.zeros(6), np.zeros((n, n)), None, width_variance=self.config.width_sigma**2)
 
     def predict(self, memory: Memory, command: Command, t: float) -> Memory:
-        """To time t under `command` (eqs. 8, 9). Before the start only time passes."""
+        """To time t under `command` (eqs. 8, 9). Before the start attitude alone is reckoned."""
         dt = t - memory.t
         if dt <= 0.0:
             return memory
         u = np.array([command.elevator, command.aileron, command.rudder, command.throttle, command.flap])
         if not memory.valid:
             steady = thrust(command.throttle, memory.airspeed, self._par)
-            return memory._replace(t=t, shadow=np.array([*u[:3], command.flap, steady, 0.0]))
+            shadow = np.array([*u[:3], command.flap, steady, 0.0])
+            return memory._replace(t=t, shadow=shadow, x=reckoned(memory.x, memory.gyro, memory.airspeed, dt))
         phase = "ground" if memory.on_ground else "start" if memory.frames < self.config.start_frames else "air"
         told = (
             memory.x, memory.shadow, u, self._par, memory.on_ground, dt, self.blocks.index, self.blocks.starts,

@@ -1,0 +1,80 @@
+"""What is made and called many times a cycle is made and called as cheaply as it should be, and is otherwise the same."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Mapping
+from dataclasses import FrozenInstanceError, asdict, dataclass, field, fields, replace
+
+import numpy as np
+import pytest
+
+from landing_sim.jit import direct, kernel
+from landing_sim.records import record
+
+
+@record
+class Fast:
+    a: float
+    b: str = "b"
+    extra: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Plain:
+    a: float
+    b: str = "b"
+    extra: Mapping[str, float] = field(default_factory=dict)
+
+
+def test_a_record_is_the_frozen_dataclass() -> None:
+    for given, named in (((1.0,), {}), ((1.0, "c"), {}), ((), {"extra": {"x": 2.0}, "a": 1.0})):
+        fast, plain = Fast(*given, **named), Plain(*given, **named)  # type: ignore[arg-type]
+        assert asdict(fast) == asdict(plain)
+        assert fast == Fast(*given, **named) and fast != Fast(2.0)  # type: ignore[arg-type]
+        assert pickle.loads(pickle.dumps(fast)) == fast
+    assert Fast.__slots__ == Plain.__slots__ and not hasattr(Fast(1.0), "__dict__")
+    assert [(f.name, f.type) for f in fields(Fast)] == [(f.name, f.type) for f in fields(Plain)]
+    assert replace(Fast(1.0), b="d") == Fast(1.0, "d")
+    assert repr(Fast(1.0)) == "Fast(a=1.0, b='b', extra={})"
+    assert Fast(1.0).extra is not Fast(1.0).extra
+
+
+def test_a_record_cannot_be_changed() -> None:
+    fast = Fast(1.0)
+    with pytest.raises(FrozenInstanceError):
+        fast.a = 2.0  # type: ignore[misc]
+    with pytest.raises(FrozenInstanceError):
+        del fast.a
+    with pytest.raises(TypeError):
+        Fast()  # type: ignore[call-arg]
+    with pytest.raises(TypeError):
+        Fast(1.0, "b", {}, 2.0)  # type: ignore[call-arg]
+
+
+def test_a_record_does_without_post_init() -> None:
+    with pytest.raises(AssertionError, match="__post_init__"):
+
+        @record
+        class Checked:
+            a: float
+
+            def __post_init__(self) -> None: ...
+
+
+@kernel
+def scaled(x: np.ndarray, by: float) -> float:
+    return float(by * x[0])
+
+
+def test_a_kernel_is_called_directly_once_it_is_compiled_for_one_type_alone() -> None:
+    x = np.array([3.0])
+    if not scaled.overloads:  # type: ignore[attr-defined]
+        assert direct(scaled) is scaled
+    assert scaled(x, 2.0) == 6.0
+    straight = direct(scaled)
+    assert straight is not scaled and straight(x, 2.0) == 6.0 and straight(x, 2) == 6.0
+    with pytest.raises(TypeError):
+        straight(x)
+    scaled(np.array([3], dtype=np.int64), 2.0)
+    assert direct(scaled) is scaled
