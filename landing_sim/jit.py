@@ -47,8 +47,8 @@ def kernel(function: F) -> F:
 def direct(compiled: Callable[..., Any]) -> Callable[..., Any]:
     """What calls a kernel without the dispatcher's look at the types of its arguments, half of what a small call costs.
 
-    For kernels called once a step, always with arrays of the same type and layout: these are not looked at again. The
-    kernel itself, where it has not been compiled yet, or for several types.
+    For kernels that are called every step with the very same arrays: another shape or type is not noticed any more, it is
+    read as if it were the one compiled for. The kernel itself, where it has not been compiled yet, or for several types.
     """
     overloads = list(getattr(compiled, "overloads", {}).values())  # none where numba is switched off
     return overloads[0].entry_point if len(overloads) == 1 else compiled

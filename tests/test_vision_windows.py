@@ -419,6 +419,11 @@ def test_front_end_tracks_what_is_known_and_acquires_what_is_not() -> None:
         later = replace(sample, data=bench.sample(bench.renderer(), pose, pan, tilt, index))
         kinds += [m.kind for m in front_end.process(later, lambda: estimate_of(pose, lost=True))]
     assert kinds == ["pose", *["edges"] * 4] * 2
+    found = []
+    for index in (3, 98, 99, 100, 101, 104, 105, 106):  # never seen: every image at first, then now and then
+        later = replace(sample, data=bench.sample(bench.renderer(), pose, pan, tilt, index))
+        found += [index for _ in front_end.process(later, lambda: estimate_of(pose, valid=False))]
+    assert found == [3, 98, 99, 100, 105]
 
 
 def test_commanded_angles_are_told_where_there_are_no_encoders() -> None:

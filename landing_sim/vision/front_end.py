@@ -33,16 +33,17 @@ class FrontEndConfig:
             raise ValueError(f"platform_angle: must be 'encoder' or 'commanded', not {self.platform_angle!r}")
 
 
+SEARCHED_AT_FIRST = 100  # images: whoever has found nothing in them is on the way up again
 SEARCHED_WHEN_LOST = 5  # one image in so many: a search costs many times what windows do
 
 
 class RunwayFrontEnd:
     """interfaces.FrontEnd for the sensor "camera".
 
-    While the estimate is not valid each image is searched for the runway, while it says that it is lost one in
-    SEARCHED_WHEN_LOST: a measurement "pose" (x, y, H of the cg, phi, theta, psi; R (6, 6)), or none, with `reason` telling
-    why. Else windows are placed by prediction: a measurement "edges" with R (n,) variances [px^2]; where the runway is
-    lost they may still find the horizon.
+    While the estimate is not valid each of the first SEARCHED_AT_FIRST images is searched for the runway; later, and while
+    the estimate says that it is lost, one in SEARCHED_WHEN_LOST: a measurement "pose" (x, y, H of the cg, phi, theta, psi;
+    R (6, 6)), or none, with `reason` telling why. Else windows are placed by prediction: a measurement "edges" with R (n,)
+    variances [px^2]; where the runway is lost they may still find the horizon.
 
     Holds no memory between frames but `reason`, which nothing reads back.
     """
@@ -75,7 +76,10 @@ class RunwayFrontEnd:
         pan, tilt = (data.pan, data.tilt) if self._encoder else (data.pan_cmd, data.tilt_cmd)
         believed = estimate()
         lost = believed.flags.get("lost", False)
-        if not believed.valid or (lost and data.index % SEARCHED_WHEN_LOST == 0):
+        due = data.index % SEARCHED_WHEN_LOST == 0
+        if not believed.valid and data.index >= SEARCHED_AT_FIRST and not due:
+            return ()
+        if not believed.valid or (lost and due):
             got = self._acquisition.acquire(data, pan, tilt)
             self.reason = got.reason
             if got.z is None or got.R is None:
