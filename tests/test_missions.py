@@ -98,12 +98,12 @@ def test_an_approach_that_never_finds_the_runway_climbs_away() -> None:
     assert log["true_H_m"][-1] > 60.0
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_who_never_sees_the_runway_climbs_away_with_wings_level(seed: int) -> None:
-    """In turbulence, from gyros and airspeed alone, until it has flown past the place where the runway must be."""
-    flight = fly(
-        "transport/turbulence", "faults=[{sensor: camera, kind: off, start_s: 0}]", "time.limit_s=150", seed=seed
-    )
+@pytest.mark.parametrize(
+    ("name", "seed"), [("transport/turbulence", 1), ("transport/turbulence", 2), ("transport/gibert_far", 1)]
+)
+def test_who_never_sees_the_runway_climbs_away_with_wings_level(name: str, seed: int) -> None:
+    """In turbulence, by gyros or an inertial unit and airspeed, until it has flown past where the runway must be."""
+    flight = fly(name, "faults=[{sensor: camera, kind: off, start_s: 0}]", "time.limit_s=150", seed=seed)
     log = flight.log
     assert flight.verdict.outcome == "go_around"
     assert not log["valid"].any()

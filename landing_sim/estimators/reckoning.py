@@ -25,6 +25,11 @@ def reckoned(x: Array, gyro: Array, airspeed: float, dt: float) -> Array:
     turn = q * math.sin(phi) + r * math.cos(phi)
     x[PHI] += dt * (p + math.tan(theta) * turn - (phi - math.atan(V * turn / GRAVITY)) / BANK_TIME)
     x[THETA] += dt * (q * math.cos(phi) - r * math.sin(phi))
-    x[W] = (x[W] + dt * V * q) / (1.0 + dt * GRAVITY * LOAD_PER_ALPHA / V)
+    x[W] = followed(float(x[W]), q, V, dt)
     x[P], x[Q], x[R], x[U] = p, q, r, airspeed
     return x
+
+
+def followed(w: float, q: float, V: float, dt: float) -> float:
+    """w [m/s] dt [s] later: by how much the path lags behind a pitch that changes at q [rad/s], at the airspeed V [m/s]."""
+    return (w + dt * V * q) / (1.0 + dt * GRAVITY * LOAD_PER_ALPHA / V)

@@ -20,6 +20,7 @@ import numpy as np
 from landing_sim.estimators.observer import scene as sc
 from landing_sim.estimators.observer.looking import Image, Ranging
 from landing_sim.estimators.observer.scene import Scene, carriage, from_course
+from landing_sim.estimators.reckoning import followed
 from landing_sim.geometry.runway_image import horizon_dip
 from landing_sim.geometry.so3 import from_euler, to_euler, turned, wrap
 from landing_sim.jit import kernel
@@ -62,6 +63,7 @@ class ObserverConfig:
 
 
 _STILL = np.zeros(3)
+_NOTHING = np.zeros(9)
 
 
 class Memory(NamedTuple):
@@ -78,6 +80,7 @@ class Memory(NamedTuple):
     t_wind: float = -math.inf
     on_ground: bool = False
     trusted: bool = False
+    unseen: Array = _NOTHING  # (9,) u v w p q r phi theta psi where there is no scene: see `reckoning.reckoned`
 
 
 class RunwayObserver:
@@ -101,7 +104,7 @@ class RunwayObserver:
             case "inertial":
                 return self._inertial(memory, measurement.z)
             case "airspeed":
-                return Memory(*memory[:4], float(measurement.z[0]), *memory[5:])
+                return Memory(*memory[:4], float(measurement.z[0]), *memory[5:])  # type: ignore[arg-type]
             case "flow_angles":
                 return self._wind(memory, measurement.z)
             case "on_ground":
@@ -119,7 +122,8 @@ class RunwayObserver:
         """The estimate at the memory's time; an age `t` asked for is ignored (see Rewind)."""
         scene, z = memory.scene, memory.inertial
         if scene is None or z is None:
-            return Estimate(memory.t, NAMES, np.zeros(len(NAMES)), None, False, {"on_ground": memory.on_ground})
+            told = np.concatenate([memory.unseen, np.zeros(len(NAMES) - len(memory.unseen))])
+            return Estimate(memory.t, NAMES, told, None, False, {"on_ground": memory.on_ground})
         mean = _mean(
             z, scene.s, memory.t - memory.t_inertial, self._lever, memory.wind, scene.spread, scene.d[0], scene.d[1],
             scene.d[2],
@@ -138,7 +142,8 @@ class RunwayObserver:
         scene, dt = memory.scene, memory.t - memory.t_inertial
         if scene is not None and memory.inertial is not None:
             scene = self.ranging.move(scene, _way(scene.s, memory.inertial, z, self._lever), dt)
-        return Memory(memory.t, scene, z, memory.t, *memory[4:])
+        unseen = memory.unseen if scene is not None else _unseen(memory, z, dt)
+        return Memory(memory.t, scene, z, memory.t, *memory[4:-1], unseen)
 
     def _wind(self, memory: Memory, flow: Array) -> Memory:
         """What is left of the velocity over the ground when the one through the air is taken off, smoothed.
@@ -190,6 +195,16 @@ class RunwayObserver:
             memory.scene, Image(memory.t, m, memory.inertial), carriage(memory.inertial, memory.scene.s)
         )
         return memory._replace(scene=scene, trusted=memory.trusted or scene.spread <= self.config.trust)
+
+
+def _unseen(memory: Memory, z: Array, dt: float) -> Array:
+    """`Memory.unseen` after a reading z (12,), dt [s] after the one before: pitch from where it began."""
+    phi, theta, _, p, q, r = z[:6].tolist()
+    if memory.inertial is None or not memory.airspeed > 0.0:
+        return _NOTHING
+    _, _, w, *_, pitch, _ = memory.unseen.tolist()
+    pitch += theta - float(memory.inertial[1])
+    return np.array([memory.airspeed, 0.0, followed(w, q, memory.airspeed, dt), p, q, r, phi, pitch, 0.0])
 
 
 @kernel
