@@ -118,7 +118,7 @@ class RunwayEkf:
         )  # fmt: skip
         if memory.D is None and self._wind is None:
             x, shadow, P = forward_dense(memory.P, *told)
-            return memory._replace(t=t, x=x, shadow=shadow, P=P)
+            return Memory(t, memory.valid, x, shadow, P, *memory[5:])
         x, shadow, Phi, Qd = transition(*told)
         if self._wind is not None and not memory.on_ground:
             changes = change(x[states.H] - self._slope * x[states.X], self.config.turbulence, memory.airspeed, dt)
@@ -139,13 +139,13 @@ class RunwayEkf:
                 if not memory.valid:
                     return memory._replace(gyro=measurement.z)
                 x, P, D = self._reading(memory, gyro_dense, gyro_model, measurement.z, measurement.R)
-                return memory._replace(x=x, P=P, D=D, gyro=measurement.z)
+                return Memory(*memory[:2], x, memory.shadow, P, D, memory.airspeed, measurement.z, *memory[8:])  # type: ignore[arg-type]
             case "airspeed":
                 z = float(measurement.z[0])
                 if not memory.valid:
                     return memory._replace(airspeed=z)
                 x, P, D = self._reading(memory, airspeed_dense, airspeed_model, z, measurement.R)
-                return memory._replace(x=x, P=P, D=D, airspeed=z)
+                return Memory(*memory[:2], x, memory.shadow, P, D, z, *memory[7:])  # type: ignore[arg-type]
             case "on_ground":
                 down = bool(measurement.z[0] > 0.5)
                 return memory if down == memory.on_ground else memory._replace(on_ground=down)

@@ -138,12 +138,17 @@ class Wind:
     Raises ValueError for turbulence without a noise stream, for a slope that is not finite.
     """
 
-    __slots__ = ("_slope", "_velocities")
+    __slots__ = ("_slope", "_steady", "_velocities")
 
     def __init__(self, config: WindConfig, noise: NoiseStream | None = None, slope: float = 0.0) -> None:
         _check_finite("wind", (slope,))
         self._slope = slope
-        parts: list[WindPart] = [config.steady]
+        parts: list[WindPart] = []
+        self._steady = (0.0, 0.0, 0.0)  # what needs not be asked for every time
+        if isinstance(config.steady, SteadyWind):
+            self._steady = (0.0 - config.steady.headwind, 0.0 + config.steady.crosswind, 0.0)
+        else:
+            parts.append(config.steady)
         if config.step is not None:
             parts.append(config.step)
         if config.gust is not None:
@@ -165,7 +170,7 @@ class Wind:
         """Velocity of the air in R at the aircraft [m/s]."""
         if x > 0.0:
             height -= self._slope * x
-        wx = wy = wz = 0.0
+        wx, wy, wz = self._steady
         for velocity in self._velocities:
             a, b, c = velocity(t, x, y, height, airspeed)
             wx += a
