@@ -6,6 +6,7 @@ and controller decide, and their command acts after the computing delay; in betw
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -123,10 +124,12 @@ def simulate(
         )
 
         # the world moves on
+        due: float = pending[0][0]
         for _ in range(clock.cycle):
-            if pending and pending[0][0] <= tick:
+            if due <= tick:
                 memory = estimator.predict(memory, acting, tick * dt)
                 acting = pending.popleft()[1]
+                due = pending[0][0] if pending else math.inf
             fly(acting, blow(tick * dt, *place()))
             tick += 1
         truth = plant.truth()

@@ -14,13 +14,11 @@ from landing_sim.geometry import so3
 from landing_sim.geometry.earth import RunwayFrame
 from landing_sim.jit import direct
 from landing_sim.plants import motion
-from landing_sim.plants.jsbsim import AIRSPEED, FT, LBF, RATES, FlightModel, PlantError
+from landing_sim.plants.jsbsim import FT, LBF, RATES, FlightModel, PlantError
 from landing_sim.plants.trim import TrimPoint, trim
 from landing_sim.plants.wheels import Contacts, read_contacts
 from landing_sim.signals import CameraTruth, Command, Touchdown, Truth
 from landing_sim.types import Array
-
-FAR_AWAY = 50e3  # [m] where a level plane is no longer the Earth
 
 
 class Platform(Protocol):
@@ -207,13 +205,12 @@ class JsbsimPlant:
         does to the wheels until the next step. Returns p, q, r [rad/s]."""
         model = self._model
         said = model.motion()
-        self._x, self._y, self._H, elevation, least, finite = self._settle_kernel(
+        self._x, self._y, self._H, self._airspeed, elevation, least, sound = self._settle_kernel(
             *said, command.brake_left, command.brake_right, *self._settling
         )
-        self._airspeed = said[AIRSPEED] * FT
-        if not finite:
-            raise PlantError(f"the flight model's state is not finite at t = {self._tick * self.dt:.3f} s")
-        if abs(self._x) + abs(self._H) > FAR_AWAY:
+        if not sound:
+            if not math.isfinite(sum(said)):
+                raise PlantError(f"the flight model's state is not finite at t = {self._tick * self.dt:.3f} s")
             raise PlantError(f"the aircraft has left the runway's neighbourhood: x {self._x:g} m, H {self._H:g} m")
         model.set_terrain_ft(elevation)
         if least < 0.0 or self._pushing:

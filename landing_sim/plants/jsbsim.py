@@ -34,7 +34,7 @@ def control_names(n_engines: int) -> tuple[str, ...]:
     return ("fcs/elevator-cmd-norm", "fcs/aileron-cmd-norm", "fcs/rudder-cmd-norm", "fcs/flap-cmd-norm", *throttles)
 
 
-AIRSPEED, RATES = 12, 13  # where it is, and where these begin, in what `FlightModel.motion` reads
+RATES = 13  # where they begin in what `FlightModel.motion` reads
 
 Read = Callable[[], float]
 

@@ -13,6 +13,8 @@ from landing_sim.plants.jsbsim import FT, LBF
 from landing_sim.plants.wheels import heights, reactions
 from landing_sim.types import Array
 
+FAR_AWAY = 50e3  # [m] where a level plane is no longer the Earth
+
 # rows of a body
 P, V, W, UVW = 0, 1, 2, 3  # p_RB [m], v_RB_R [m/s], w_RB_B [rad/s], v_RB_B [m/s]; B's origin is the nominal cg
 R_RB, R_RN = 4, 7  # three rows each
@@ -33,7 +35,7 @@ def settle(
     u: float, v: float, w: float, airspeed: float, p: float, q: float, r: float,
     brake_left: float, brake_right: float, slope: float, dt: float, site: Array, p_B: Array, values: Array,
     height: Array, bristle: Array, body: Array,
-) -> tuple[float, float, float, float, float, bool]:  # fmt: skip
+) -> tuple[float, float, float, float, float, float, bool]:  # fmt: skip
     """Fill `body` (ROWS, 3) from JSBSim's own figures, and work out what the ground does to its wheels.
 
     x y z : [ft] of the actual cg, Earth-centred; lat, lon [rad] geodetic; altitude [ft] above the ellipsoid
@@ -41,8 +43,8 @@ def settle(
     u v w : [ft/s] over the ground, p q r [rad/s], body axes; airspeed [ft/s]
     site : (SITE_ROWS, 3); slope, p_B, values, height, bristle : see `wheels`
 
-    Returns x, y, H [m] of the actual cg in R, the elevation [ft] of the runway's surface below it, the least height [m]
-    of a contact, and whether all of JSBSim's figures are finite.
+    Returns x, y, H [m] of the actual cg in R, the airspeed [m/s], the elevation [ft] of the runway's surface below it, the
+    least height [m] of a contact, and whether all of JSBSim's figures are finite and the runway is near.
     """
     sp, cp, sl, cl = math.sin(lat), math.cos(lat), math.sin(lon), math.cos(lon)
     dx, dy, dz = x * FT - site[ORIGIN_E, 0], y * FT - site[ORIGIN_E, 1], z * FT - site[ORIGIN_E, 2]
@@ -86,7 +88,8 @@ def settle(
             body[FORCE, i] /= LBF
             body[MOMENT, i] /= LBF * FT
     finite = math.isfinite(x + y + z + phi + theta + psi + u + v + w + airspeed + p + q + r)
-    return at_x, at_y, -down, elevation / FT, least, finite
+    sound = finite and abs(at_x) + abs(down) <= FAR_AWAY
+    return at_x, at_y, -down, airspeed * FT, elevation / FT, least, sound
 
 
 @kernel
