@@ -12,8 +12,8 @@ T = TypeVar("T")
 def record(cls: type[T]) -> type[T]:
     """`dataclass(frozen=True, slots=True)` whose `__init__` writes into the slots themselves.
 
-    A frozen dataclass looks up `object.__setattr__` and the slot by its name for every field: half of what it takes to
-    make one. For classes without `__post_init__` only.
+    A frozen dataclass looks up `object.__setattr__` and the slot by its name for every field: two fifths of what it
+    takes to make one. For classes without `__post_init__` only.
     """
     made: Any = dataclass(frozen=True, slots=True)(cls)
     assert not hasattr(made, "__post_init__"), f"{cls.__name__} has a __post_init__: it would not be called"

@@ -18,8 +18,8 @@ import math
 
 import numpy as np
 
-from landing_sim.geometry.runway_image import EARTH_RADIUS, HORIZON, LEFT, RIGHT, THRESHOLD, Vector, horizon_dip, plane
-from landing_sim.geometry.so3 import turned
+from landing_sim.geometry.runway_image import EARTH_RADIUS, HORIZON, LEFT, RIGHT, THRESHOLD, horizon_dip, plane
+from landing_sim.geometry.so3 import back, turned
 from landing_sim.jit import kernel
 from landing_sim.types import Array
 
@@ -37,16 +37,6 @@ def turning_axes(phi: float, theta: float, pan: float) -> Array:
     axes[3, 2] = 1.0
     axes[4, 0], axes[4, 1] = -math.sin(pan), math.cos(pan)
     return axes
-
-
-@kernel
-def back(R: Array, x: float, y: float, z: float) -> Vector:
-    """R^T v of the vector v = (x, y, z)."""
-    return (
-        R[0, 0] * x + R[1, 0] * y + R[2, 0] * z,
-        R[0, 1] * x + R[1, 1] * y + R[2, 1] * z,
-        R[0, 2] * x + R[1, 2] * y + R[2, 2] * z,
-    )
 
 
 @kernel

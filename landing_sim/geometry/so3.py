@@ -80,6 +80,16 @@ def turned(R: Array, x: float, y: float, z: float) -> tuple[float, float, float]
 
 
 @kernel
+def back(R: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """R^T v of the vector v = (x, y, z)."""
+    return (
+        R[0, 0] * x + R[1, 0] * y + R[2, 0] * z,
+        R[0, 1] * x + R[1, 1] * y + R[2, 1] * z,
+        R[0, 2] * x + R[1, 2] * y + R[2, 2] * z,
+    )
+
+
+@kernel
 def wrap(angle: float) -> float:
     """The same angle in (-pi, pi]."""
     return math.atan2(math.sin(angle), math.cos(angle))

@@ -146,7 +146,8 @@ class Wind:
         parts: list[WindPart] = []
         self._steady = (0.0, 0.0, 0.0)  # what needs not be asked for every time
         if isinstance(config.steady, SteadyWind):
-            self._steady = (0.0 - config.steady.headwind, 0.0 + config.steady.crosswind, 0.0)
+            x, y, z = config.steady.velocity(0.0, 0.0, 0.0, 0.0, 0.0)
+            self._steady = (0.0 + x, 0.0 + y, 0.0 + z)  # as a sum that begins with zero: there is no -0.0
         else:
             parts.append(config.steady)
         if config.step is not None:
