@@ -59,29 +59,46 @@ def ud_product(U: Array, D: Array) -> Array:
 
 
 @kernel
-def predict_dense(P: Array, Phi: Array, Qd: Array, starts: Array) -> Array:
-    """P- = Phi P+ Phi' + Qd within each block (eq. 9)."""
-    n = P.shape[0]
-    out = np.zeros((n, n))
-    TT = np.zeros((n, n))  # (Phi P+)'; most of Phi is zero and left out, which changes no bit
+def own_blocks(M: Array, starts: Array) -> Array:
+    """M (n, n) without what couples one block to another; M itself where there is one block."""
+    if len(starts) == 2:
+        return M
+    out = np.zeros(M.shape)
     for b in range(starts.shape[0] - 1):
-        lo, hi = starts[b], starts[b + 1]
-        for i in range(lo, hi):
-            for k in range(lo, hi):
-                a = Phi[i, k]
-                if a != 0.0:
-                    for j in range(lo, hi):
-                        TT[j, i] += a * P[k, j]
-        for j in range(lo, hi):
-            for i in range(lo, j + 1):
-                out[j, i] = Qd[i, j]
-            for k in range(lo, hi):
-                a = Phi[j, k]
-                if a != 0.0:
-                    for i in range(lo, j + 1):
-                        out[j, i] += TT[k, i] * a
-            for i in range(lo, j):
-                out[i, j] = out[j, i]
+        for i in range(starts[b], starts[b + 1]):
+            for j in range(starts[b], starts[b + 1]):
+                out[i, j] = M[i, j]
+    return out
+
+
+@kernel
+def predict_dense(P: Array, Phi: Array, Qd: Array, starts: Array) -> Array:
+    """P- = Phi P+ Phi' + Qd within each block (eq. 9); Qd is symmetric.
+
+    Row by row, each from its beginning, so that the processor takes several of its entries at a time; most of Phi is zero
+    and left out, which changes no bit.
+    """
+    n = P.shape[0]
+    P, Phi, Qd = own_blocks(P, starts), own_blocks(Phi, starts), own_blocks(Qd, starts)
+    T = np.zeros((n, n))  # Phi P+
+    for i in range(n):
+        for k in range(n):
+            a = Phi[i, k]
+            if a != 0.0:
+                for j in range(n):
+                    T[i, j] += a * P[k, j]
+    TT = T.T.copy()
+    out = np.empty((n, n))
+    for j in range(n):
+        for i in range(j + 1):
+            out[j, i] = Qd[j, i]
+        for k in range(n):
+            a = Phi[j, k]
+            if a != 0.0:
+                for i in range(j + 1):
+                    out[j, i] += TT[k, i] * a
+        for i in range(j):
+            out[i, j] = out[j, i]
     return out
 
 
@@ -127,13 +144,19 @@ def predict_ud(U: Array, D: Array, Phi: Array, Qd: Array, starts: Array) -> tupl
 def innovation_variance(P: Array, Hn: Array, R: Array) -> Array:
     """s (m,) = diag(H P H') + R, before any update."""
     m, n = Hn.shape
-    s = np.empty(m)
+    s, seen = np.empty(m), np.empty(n, np.int64)
     for i in range(m):
-        acc = R[i]
+        count = 0
         for a in range(n):
             if Hn[i, a] != 0.0:
-                for b in range(n):
-                    acc += Hn[i, a] * P[a, b] * Hn[i, b]
+                seen[count] = a
+                count += 1
+        acc = R[i]
+        for k in range(count):
+            a = seen[k]
+            for l in range(count):
+                b = seen[l]
+                acc += Hn[i, a] * P[a, b] * Hn[i, b]
         s[i] = acc
     return s
 
@@ -142,8 +165,7 @@ def innovation_variance(P: Array, Hn: Array, R: Array) -> Array:
 def update_dense(P: Array, Hn: Array, R: Array, nu: Array, use: Array, starts: Array) -> tuple[Array, Array, float]:
     """Sequential update; P is changed in place. Returns P, dx (n,), and the normalised innovation squared."""
     n = P.shape[0]
-    dx = np.zeros(n)
-    PH = np.empty(n)
+    dx, PH, own = np.zeros(n), np.empty(n), np.zeros(n)
     nis = 0.0
     for i in range(Hn.shape[0]):
         if not use[i]:
@@ -151,20 +173,24 @@ def update_dense(P: Array, Hn: Array, R: Array, nu: Array, use: Array, starts: A
         e = nu[i]
         s = R[i]
         for a in range(n):
-            acc = 0.0
-            for b in range(n):
-                acc += P[a, b] * Hn[i, b]
-            PH[a] = acc
-            s += Hn[i, a] * acc
+            PH[a] = 0.0
+        for b in range(n):
+            h = Hn[i, b]
+            if h != 0.0:
+                for a in range(n):
+                    PH[a] += P[b, a] * h  # P is symmetric: its rows are its columns
+        for a in range(n):
+            s += Hn[i, a] * PH[a]
             e -= Hn[i, a] * dx[a]
         nis += e * e / s
         for a in range(n):
             dx[a] += PH[a] * e / s
         for b in range(starts.shape[0] - 1):
-            for a in range(starts[b], starts[b + 1]):
-                for c in range(a, starts[b + 1]):
-                    P[a, c] -= PH[a] * PH[c] / s
-                    P[c, a] = P[a, c]
+            for a in range(n):
+                own[a] = PH[a] if starts[b] <= a < starts[b + 1] else 0.0
+            for a in range(n):
+                for c in range(n):
+                    P[a, c] -= own[a] * own[c] / s
     return P, dx, nis
 
 
@@ -220,19 +246,22 @@ def integrated_noise(Phi: Array, q: Array, dt: float, starts: Array) -> Array:
     Qd = (Phi q Phi' + q) dt / 2, within each block.
     """
     n = q.shape[0]
+    Phi = own_blocks(Phi, starts)
+    spread = np.empty((n, n))  # (Phi q)'
+    for i in range(n):
+        for k in range(n):
+            spread[k, i] = Phi[i, k] * q[k]
     out = np.zeros((n, n))
-    for b in range(starts.shape[0] - 1):
-        lo, hi = starts[b], starts[b + 1]
-        for j in range(lo, hi):
-            out[j, j] = q[j]
-            for k in range(lo, hi):
-                a = Phi[j, k]
-                if a != 0.0:
-                    for i in range(lo, j + 1):
-                        out[j, i] += Phi[i, k] * q[k] * a
-            for i in range(lo, j + 1):
-                out[j, i] *= 0.5 * dt
-                out[i, j] = out[j, i]
+    for j in range(n):
+        out[j, j] = q[j]
+        for k in range(n):
+            a = Phi[j, k]
+            if a != 0.0:
+                for i in range(j + 1):
+                    out[j, i] += spread[k, i] * a
+        for i in range(j + 1):
+            out[j, i] *= 0.5 * dt
+            out[i, j] = out[j, i]
     return out
 
 

@@ -253,14 +253,14 @@ class RunwayEkf:
         return memory._replace(P=U, D=D)
 
     def _correct(
-        self, memory: Memory, Hx: Array, R: Array, nu: Array, use: np.ndarray
+        self, memory: Memory, Hn: Array, R: Array, nu: Array, use: np.ndarray
     ) -> tuple[Array, Array, Array | None, Array, float]:
-        """x, P, D after an update with nu, R (m,), Hx (m, 26); the step (n,) and the NIS."""
+        """x, P, D after an update with nu, R (m,), Hn (m, n); the step (n,) and the NIS."""
         index, starts = self.blocks.index, self.blocks.starts
         if memory.D is None:
-            x, P, step, nis = correct_dense(memory.x, memory.P, index, starts, Hx, R, nu, use)
+            x, P, step, nis = correct_dense(memory.x, memory.P, index, starts, Hn, R, nu, use)
             return x, P, None, step, nis
-        return correct_ud(memory.x, memory.P, memory.D, index, starts, Hx, R, nu, use)  # type: ignore[no-any-return]
+        return correct_ud(memory.x, memory.P, memory.D, index, starts, Hn, R, nu, use)  # type: ignore[no-any-return]
 
     def _reading(
         self, memory: Memory, dense: Callable[..., Any], model: Callable[..., Any], z: Array | float, R: Array
@@ -270,7 +270,7 @@ class RunwayEkf:
             x, P = dense(memory.x, memory.P, self.blocks.index, self.blocks.starts, z, R, _ALL)
             return x, P, None
         nu, Hx = model(memory.x, z)
-        return self._correct(memory, Hx, R, nu, _ALL)[:3]
+        return self._correct(memory, of_index(Hx, self.blocks.index), R, nu, _ALL)[:3]
 
     def _edges(self, memory: Memory, m: Measurement) -> Memory:
         edges, c = m.geometry, self.config
@@ -289,14 +289,14 @@ class RunwayEkf:
             )
         else:
             cov = self._covariance(memory)
-            nu, R, Hx, use, innovation, status, found, used, runway, threshold = weigh(memory.x, cov, index, *told)
+            nu, R, Hn, use, innovation, status, found, used, runway, threshold = weigh(memory.x, cov, index, *told)
             R_used = R * np.maximum(1.0, np.abs(nu) / (np.sqrt(R) * c.huber)) if starting else R
-            x, P, D, step, nis = self._correct(memory, Hx, R_used, nu, use)
+            x, P, D, step, nis = self._correct(memory, Hn, R_used, nu, use)
             for _ in range(c.start_iterations - 1 if starting else 0):
                 # Huber: an edge far off at the current iterate counts less
-                nu, R, Hx, *_ = weigh(x, cov, index, *told)
+                nu, R, Hn, *_ = weigh(x, cov, index, *told)
                 R_used = R * np.maximum(1.0, np.abs(nu) / (np.sqrt(R) * c.huber))
-                x, P, D, step, nis = self._correct(memory, Hx, R_used, nu + of_index(Hx, index) @ step, use)
+                x, P, D, step, nis = self._correct(memory, Hn, R_used, nu + Hn @ step, use)
         after = memory._replace(
             x=x,
             P=P,

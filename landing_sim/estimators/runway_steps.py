@@ -70,12 +70,13 @@ def weigh(
     z, variance (n,) as measured, NaN where not found; extra [px^2] is added to the variance; an innovation of a square
     beyond `gate` times its variance is not used.
 
-    Returns nu (n,) and R (n,), 0 and 1 where not found; Hx (n, 26); use (n,) bool; nu with NaN; status (n,) with the
+    Returns nu (n,) and R (n,), 0 and 1 where not found; Hn (n, :) of `of_index`; use (n,) bool; nu with NaN; status (n,) with the
     gate's; and how many were found, how many are used, whether one of these lies on the runway, and on its threshold.
     """
     n = len(z)
     h, Hx = np.empty(n), np.empty((n, N))
     edge_model(x, feature, centre, direction, pan, tilt, lever, focal, slope, h, Hx)
+    Hn = of_index(Hx, index)
     nu, R, innovation = np.zeros(n), np.ones(n), np.full(n, np.nan)
     use = np.zeros(n, dtype=np.bool_)
     for i in range(n):
@@ -85,7 +86,7 @@ def weigh(
             use[i] = math.isfinite(nu[i])
     status = status.copy()
     if gate < math.inf:
-        s = innovation_variance(cov, of_index(Hx, index), R)
+        s = innovation_variance(cov, Hn, R)
         for i in range(n):
             use[i] = use[i] and nu[i] * nu[i] <= gate * s[i]
             if math.isfinite(z[i]) and not use[i]:
@@ -97,7 +98,7 @@ def weigh(
         used += use[i]
         runway |= use[i] and feature[i] != HORIZON
         threshold |= use[i] and feature[i] == THRESHOLD
-    return nu, R, Hx, use, innovation, status, found, used, runway, threshold
+    return nu, R, Hn, use, innovation, status, found, used, runway, threshold
 
 
 @kernel
@@ -112,19 +113,19 @@ def of_index(Hx: Array, index: np.ndarray) -> Array:
 
 @kernel
 def correct_dense(
-    x: Array, P: Array, index: np.ndarray, starts: np.ndarray, Hx: Array, R: Array, nu: Array, use: np.ndarray
+    x: Array, P: Array, index: np.ndarray, starts: np.ndarray, Hn: Array, R: Array, nu: Array, use: np.ndarray
 ) -> tuple[Array, Array, Array, float]:
-    """x, P after an update with nu, R (m,), Hx (m, 26); the step dx (n,) and the normalised innovation squared."""
-    P, dx, nis = update_dense(P.copy(), of_index(Hx, index), R, nu, use, starts)
+    """x, P after an update with nu, R (m,), Hn (m, n); the step dx (n,) and the normalised innovation squared."""
+    P, dx, nis = update_dense(P.copy(), Hn, R, nu, use, starts)
     return _moved(x, index, dx), P, dx, nis
 
 
 @kernel
 def correct_ud(
-    x: Array, U: Array, D: Array, index: np.ndarray, starts: np.ndarray, Hx: Array, R: Array, nu: Array, use: np.ndarray
+    x: Array, U: Array, D: Array, index: np.ndarray, starts: np.ndarray, Hn: Array, R: Array, nu: Array, use: np.ndarray
 ) -> tuple[Array, Array, Array, Array, float]:
     """The same on U-D factors: x, U, D, dx and the NIS."""
-    U, D, dx, nis = update_ud(U.copy(), D.copy(), of_index(Hx, index), R, nu, use, starts)
+    U, D, dx, nis = update_ud(U.copy(), D.copy(), Hn, R, nu, use, starts)
     return _moved(x, index, dx), U, D, dx, nis
 
 
@@ -138,10 +139,10 @@ def edges_dense(
 
     Returns x, P; nu with NaN, status (n,), the NIS; found, used, runway, threshold as `weigh` counts them.
     """
-    nu, R, Hx, use, innovation, verdict, found, used, runway, threshold = weigh(
+    nu, R, Hn, use, innovation, verdict, found, used, runway, threshold = weigh(
         x, P, index, z, variance, extra, gate, feature, status, centre, direction, pan, tilt, lever, focal, slope
     )
-    x_after, P_after, _, nis = correct_dense(x, P, index, starts, Hx, R, nu, use)
+    x_after, P_after, _, nis = correct_dense(x, P, index, starts, Hn, R, nu, use)
     return x_after, P_after, innovation, verdict, nis, found, used, runway, threshold
 
 
@@ -151,7 +152,7 @@ def gyro_dense(
 ) -> tuple[Array, Array]:
     """x, P after a reading z (3,) of the gyros."""
     nu, Hx = gyro_model(x, z)
-    x_after, P_after, _, _ = correct_dense(x, P, index, starts, Hx, R, nu, use)
+    x_after, P_after, _, _ = correct_dense(x, P, index, starts, of_index(Hx, index), R, nu, use)
     return x_after, P_after
 
 
@@ -161,7 +162,7 @@ def airspeed_dense(
 ) -> tuple[Array, Array]:
     """x, P after a reading z [m/s] of the airspeed."""
     nu, Hx = airspeed_model(x, z)
-    x_after, P_after, _, _ = correct_dense(x, P, index, starts, Hx, R, nu, use)
+    x_after, P_after, _, _ = correct_dense(x, P, index, starts, of_index(Hx, index), R, nu, use)
     return x_after, P_after
 
 

@@ -50,11 +50,12 @@ def flow_dense(
     """x, P after a flow `seen` [rad/s] along alpha, or as they were if it is beyond `gate` sigma; innovation in sigma."""
     Hx = np.empty((1, N))
     nu = np.array([seen - aircraft_flow(x, alpha, Hx[0])])
-    h = of_index(Hx, index)[0]
+    Hn = of_index(Hx, index)
+    h = Hn[0]
     ratio = nu[0] / math.sqrt(h @ P @ h + variance)
     if not abs(ratio) <= gate:
         return x, P, ratio
-    x, P, _, _ = correct_dense(x, P, index, starts, Hx, np.array([variance]), nu, np.ones(1, dtype=np.bool_))
+    x, P, _, _ = correct_dense(x, P, index, starts, Hn, np.array([variance]), nu, np.ones(1, dtype=np.bool_))
     return x, P, ratio
 
 
