@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import pickle
 from collections.abc import Mapping
 from dataclasses import FrozenInstanceError, asdict, dataclass, field, fields, replace
@@ -20,6 +21,11 @@ class Fast:
     extra: Mapping[str, float] = field(default_factory=dict)
 
 
+@record
+class Held:
+    a: float
+
+
 @dataclass(frozen=True, slots=True)
 class Plain:
     a: float
@@ -33,7 +39,9 @@ def test_a_record_is_the_frozen_dataclass() -> None:
         assert asdict(fast) == asdict(plain)
         assert fast == Fast(*given, **named) and fast != Fast(2.0)  # type: ignore[arg-type]
         assert pickle.loads(pickle.dumps(fast)) == fast
-    assert Fast.__slots__ == Plain.__slots__ and not hasattr(Fast(1.0), "__dict__")
+    assert not hasattr(Fast(1.0), "__dict__") and isinstance(Fast(1.0), Fast) and type(Fast(1.0)) is Fast
+    assert pickle.loads(pickle.dumps(Fast(1.0, extra={"x": 2.0}))) == Fast(1.0, extra={"x": 2.0})
+    assert copy.deepcopy(Fast(1.0)) == Fast(1.0) and hash(Held(1.0)) == hash(Held(1.0))
     assert [(f.name, f.type) for f in fields(Fast)] == [(f.name, f.type) for f in fields(Plain)]
     assert replace(Fast(1.0), b="d") == Fast(1.0, "d")
     assert repr(Fast(1.0)) == "Fast(a=1.0, b='b', extra={})"
@@ -60,6 +68,12 @@ def test_a_record_does_without_post_init() -> None:
             a: float
 
             def __post_init__(self) -> None: ...
+
+    with pytest.raises(AssertionError, match="base"):
+
+        @record
+        class Derived(Plain):
+            c: float = 0.0
 
 
 @kernel

@@ -297,17 +297,12 @@ class RunwayEkf:
                 nu, R, Hn, *_ = weigh(x, cov, index, *told)
                 R_used = R * np.maximum(1.0, np.abs(nu) / (np.sqrt(R) * c.huber))
                 x, P, D, step, nis = self._correct(memory, Hn, R_used, nu + Hn @ step, use)
-        after = memory._replace(
-            x=x,
-            P=P,
-            D=D,
-            frames=memory.frames + 1,
-            misses=0 if runway else memory.misses + 1,  # a horizon alone tells no place
-            threshold_in_view=threshold,
-            residuals=Residuals(innovation, status, nis, used),
-            reinflated=max(0, memory.reinflated - 1),
-            rejected=self._rejected(memory, found, used),
-        )
+        misses = 0 if runway else memory.misses + 1  # a horizon alone tells no place
+        residuals, rejected = Residuals(innovation, status, nis, used), self._rejected(memory, found, used)
+        after = Memory(
+            *memory[:2], x, memory.shadow, P, D, *memory[6:8], memory.frames + 1, misses, rejected, memory.on_ground,
+            threshold, max(0, memory.reinflated - 1), residuals, memory.width_variance,
+        )  # fmt: skip
         if self._width_filter is not None and threshold and not starting:
             after = self._widened(after, self._width_filter)
         return after if after.rejected <= c.watchdog_share else self._opened(after)

@@ -70,8 +70,9 @@ def weigh(
     z, variance (n,) as measured, NaN where not found; extra [px^2] is added to the variance; an innovation of a square
     beyond `gate` times its variance is not used.
 
-    Returns nu (n,) and R (n,), 0 and 1 where not found; Hn (n, :) of `of_index`; use (n,) bool; nu with NaN; status (n,) with the
-    gate's; and how many were found, how many are used, whether one of these lies on the runway, and on its threshold.
+    Returns nu (n,) and R (n,), 0 and 1 where not found; Hn (n, :) as `of_index` gives it; use (n,) bool; nu with NaN;
+    status (n,) with the gate's; and how many were found, how many are used, whether one of these lies on the runway, and
+    on its threshold.
     """
     n = len(z)
     h, Hx = np.empty(n), np.empty((n, N))
