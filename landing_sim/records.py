@@ -25,7 +25,9 @@ def record(cls: type[T]) -> type[T]:
     def reduced(self: Any) -> tuple[type, tuple[Any, ...]]:
         return type(self), tuple([getattr(self, name) for name in names])
 
-    made: Any = dataclass(frozen=True, slots=True, init=False)(type(cls.__name__, (opened,), {**body, "__reduce__": reduced}))
+    made: Any = dataclass(frozen=True, slots=True, init=False)(
+        type(cls.__name__, (opened,), {**body, "__reduce__": reduced})
+    )
     made.__new__ = _maker(opened, fields(made))
     return made  # type: ignore[no-any-return]
 
