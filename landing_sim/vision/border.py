@@ -154,6 +154,8 @@ def place_border(
             level, place = k // _PLACES, k % _PLACES
             if (level == 3 and rule[CLEAR_OF_PAINT] == 0.0) or (level == 4 and not far):
                 continue
+            if level == 1 and wanted <= rule[SEARCH_MIN]:  # as level 0
+                continue
             t = wish + (place // 2 + place % 2) * (1.0 if place % 2 else -1.0) / 32.0
             if t < 0.0 or t > 1.0:
                 continue
