@@ -7,13 +7,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT / "tools"))
 
-from bench_parts import bound, flights, where  # noqa: E402
+from bench_parts import bound, flights, own_frames, where  # noqa: E402
 
 from landing_sim import scenario, vehicle  # noqa: E402
 from landing_sim.estimators import kalman, states  # noqa: E402
@@ -46,8 +47,30 @@ def test_one_repeat_prints_the_promised_object() -> None:
         share = sum(part["share"] for part in figures["where"].values())
         assert share == pytest.approx(1.0)
         assert figures["where"]["plant: step"]["calls"] == figures["steps"]
-    assert found["do128"]["baseline"]["measured_share"] > 0.9
+    baseline = found["do128"]["baseline"]
+    assert baseline["measured_share"] > 0.9 and baseline["own_frames_measured_share"] > 0.9
+    assert baseline["cost_ratio"] > baseline["cost_ratio_on_our_frames"] > 1.0
     assert found["imports"].keys() >= {"numpy_cpu_s", "help_per_numpy", "check_per_numpy"}
+
+
+def test_the_baselines_own_frames_show_the_same_scene() -> None:
+    """Within what its drawing is known to do: edges most of a pixel outside, and a flat Earth's horizon."""
+    s, v = short(1.0)
+    steps: list = []
+    flights.land(s, v, watch=steps.append)
+    frame = next(sample.data.frame for sample in steps[-1].samples if sample.sensor == "camera")
+    p_RC, R_CR = frame.poses[0]
+    ours = cv2.GaussianBlur(frame.full().astype(float), (0, 0), 2.0)
+
+    def alike(R: np.ndarray) -> float:
+        """Correlation below the horizon, noise smoothed away."""
+        theirs = cv2.GaussianBlur(own_frames.artist(s)(p_RC, R).astype(float), (0, 0), 2.0)
+        below = np.flatnonzero(ours.mean(axis=1) < 120.0)[6:]
+        return float(np.corrcoef(theirs[below].ravel(), ours[below].ravel())[0, 1])
+
+    turn = 2.0 / s.camera.focal_px  # two pixels to the side
+    aside = np.array([[1.0, 0.0, turn], [0.0, 1.0, 0.0], [-turn, 0.0, 1.0]])
+    assert alike(R_CR) > 0.985 > alike(aside @ R_CR)
 
 
 def test_bare_flies_the_same_trajectory_to_the_bit() -> None:

@@ -7,6 +7,9 @@ pose as its measurement, weighs it with that covariance and drops what is five s
 runway's size, the camera, its place and the encoders' readings, and it starts from the pose that landing-sim acquired.
 Tuned by hand on this very landing.
 
+It is flown twice. Frames are part of what it must have for a landing, so it draws its own (`own_frames`), and what that
+costs is its cost. Its accuracy is taken on our frames, which are drawn more exactly than that and cheaper.
+
 What it cannot do: find the runway by itself; measure while one of the four sides is out of the picture, which ends it
 where the threshold is lost (and with it the flare and the rollout); tell wind from drift; fly (nothing here gives the
 airspeed, and it is fed with a flight that landing-sim flew); live with exits in a borderline, with a wrong width, or with
@@ -26,7 +29,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from bench_parts import where
+from bench_parts import own_frames, where
 from bench_parts.flights import land
 from landing_sim.record.judge import threshold_in_view
 from landing_sim.record.log import FlightLog
@@ -36,6 +39,7 @@ from landing_sim.vehicle import Vehicle
 
 FROM = -900.0  # [m] where the comparison begins; it ends where the threshold is lost
 COMPARED = {"range": "x", "height": "H", "lateral": "y"}
+PARTS = "render", "vision", "predict", "update"
 Array = np.ndarray
 
 
@@ -208,9 +212,20 @@ class Trace:
     seen: list[bool] = field(default_factory=list)
     seconds: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
 
+    def median_us(self) -> dict[str, float]:
+        return {name: 1e6 * median(self.seconds[name] or [math.nan]) for name in PARTS}
 
-def fly(steps: Sequence[Step], scenario: Scenario, vehicle: Vehicle) -> Trace:
-    """Over the samples of a flight, from the pose that landing-sim acquired until the flight is over."""
+
+def fly(
+    steps: Sequence[Step],
+    scenario: Scenario,
+    vehicle: Vehicle,
+    draw: Callable[[Array, Array], np.ndarray] | None = None,
+) -> Trace:
+    """Over the samples of a flight, from the pose that landing-sim acquired until the flight is over.
+
+    draw : makes the frame seen from p_RC (3,) [m] with R_CR (3, 3); without it the flight's own frames are looked at
+    """
     c, r = scenario.camera, scenario.runway
     K = np.array([[c.focal_px, 0, (c.width_px - 1) / 2], [0, c.focal_px, (c.height_px - 1) / 2], [0, 0, 1.0]])
     half, length = 0.5 * r.width_m, r.length_m
@@ -244,7 +259,7 @@ def fly(steps: Sequence[Step], scenario: Scenario, vehicle: Vehicle) -> Trace:
         got = None
         if frame is not None:
             begun = clock()
-            image = frame.frame.full()
+            image = frame.frame.full() if draw is None else draw(*frame.frame.poses[0])  # type: ignore[attr-defined]
             rendered = clock()
             got = eye.look(image, ekf.x, frame.pan, frame.tilt)
             looked = clock()
@@ -275,12 +290,42 @@ def beside(scenario: Scenario, vehicle: Vehicle, say: Callable[[str], None] = la
     steps: list[Step] = []
     flight = land(scenario, vehicle, watch=steps.append)
     log, use = flight.log, window(flight.log)
-    first = len(log) - sum(1 for _ in _from_acquisition(steps))
-    trace = fly(steps, scenario, vehicle)
     out: dict[str, Any] = {
         "frames": f"{scenario.camera.width_px}x{scenario.camera.height_px}",
         "cycles": int(use.sum()),
     }
+    given, drawn = fly(steps, scenario, vehicle), fly(steps, scenario, vehicle, own_frames.artist(scenario))
+    own = _accuracy(drawn, log, use)
+    out |= _accuracy(given, log, use) | {f"own_frames_{key}": value for key, value in own.items() if key[:4] != "our_"}
+    # ours over the same part of the flight, finding the runway included: it ends where the threshold is lost
+    seen = float(log["t_s"][threshold_in_view(log)][-1]) if use.any() else flight.seconds
+    until = scenario.model_copy(update={"time": scenario.time.model_copy(update={"limit_s": seen})})
+    parts = [where.parts_of(until, vehicle) for _ in range(5)]
+    frames = int(np.sum(log["meas_frame"][log["t_s"] <= seen] >= 0))
+
+    def ours(*names: str) -> float:
+        return sum(median(1e6 * p[n]["seconds"] for p in parts) for n in names if n in parts[0]) / frames
+
+    our_render, our_vision = ours("render windows"), ours("front end")
+    our_estimate = ours("estimator: predict", "estimator: update", "estimator: read", "readings")
+    our_total = our_render + our_vision + our_estimate
+    cost = given.median_us() | {"own_render": drawn.median_us()["render"]}
+    on_board = cost["vision"] + cost["predict"] + cost["update"]
+    out |= {
+        "own_render_us": cost["own_render"], "render_us": cost["render"], "vision_us": cost["vision"],
+        "estimate_us": cost["predict"] + cost["update"], "frame_us": cost["own_render"] + on_board,
+        "our_render_us": our_render, "our_vision_us": our_vision, "our_estimate_us": our_estimate,
+        "our_frame_us": our_total,
+        "cost_ratio": (cost["own_render"] + on_board) / our_total,
+        "cost_ratio_on_our_frames": (cost["render"] + on_board) / our_total,
+        "cost_ratio_without_rendering": on_board / (our_vision + our_estimate),
+    }  # fmt: skip
+    return out
+
+
+def _accuracy(trace: Trace, log: FlightLog, use: np.ndarray) -> dict[str, float]:
+    """RMS errors [m] of a trace, which ends with the log, and of ours in the cycles to use; their ratios."""
+    first, out = len(log) - len(trace.mean), {}
     theirs = np.full((len(log), 3), np.nan)
     theirs[first:] = (np.array(trace.mean) - np.array(trace.truth)).reshape(-1, 3)
     for (name, state), column in zip(COMPARED.items(), (0, 2, 1)):
@@ -292,32 +337,4 @@ def beside(scenario: Scenario, vehicle: Vehicle, say: Callable[[str], None] = la
             f"{name}_ratio": rms[0] / rms[1] if rms[1] else math.nan,
         }
     out["measured_share"] = float(np.mean(np.array(trace.seen, bool)[use[first:]])) if use.any() else math.nan
-    cost = {name: 1e6 * median(s) if s else math.nan for name, s in trace.seconds.items()}
-    render, vision = cost.get("render", math.nan), cost.get("vision", math.nan)
-    estimate = cost.get("predict", math.nan) + cost.get("update", math.nan)
-    # ours over the same part of the flight, finding the runway included: it ends where the threshold is lost
-    seen = float(log["t_s"][threshold_in_view(log)][-1]) if use.any() else flight.seconds
-    until = scenario.model_copy(update={"time": scenario.time.model_copy(update={"limit_s": seen})})
-    parts = [where.parts_of(until, vehicle) for _ in range(5)]
-
-    def ours(*names: str) -> float:
-        return sum(median(1e6 * p[n]["seconds"] for p in parts) for n in names if n in parts[0]) / frames
-
-    frames = int(np.sum(log["meas_frame"][log["t_s"] <= seen] >= 0))
-
-    our_render, our_vision = ours("render windows"), ours("front end")
-    our_estimate = ours("estimator: predict", "estimator: update", "estimator: read", "readings")
-    total, our_total = render + vision + estimate, our_render + our_vision + our_estimate
-    out |= {
-        "render_us": render, "vision_us": vision, "estimate_us": estimate, "frame_us": total,
-        "our_render_us": our_render, "our_vision_us": our_vision, "our_estimate_us": our_estimate,
-        "our_frame_us": our_total,
-        "cost_ratio": total / our_total,
-        "cost_ratio_without_rendering": (vision + estimate) / (our_vision + our_estimate),
-    }  # fmt: skip
     return out
-
-
-def _from_acquisition(steps: Sequence[Step]) -> list[Step]:
-    k = next((k for k, s in enumerate(steps) if any(m.kind == "pose" for m in s.measurements)), len(steps))
-    return list(steps[k:])

@@ -61,12 +61,20 @@ def _baseline(b: Mapping[str, Any]) -> Iterator[str]:
     yield f"  beside the afternoon's baseline, {b['frames']}, {b['cycles']} cycles     theirs     ours   ratio"
     for name in ("range", "height", "lateral"):
         theirs, ours = b[f"{name}_rms_m"], b[f"our_{name}_rms_m"]
-        yield f"    {name + ' RMS [m]':44s} {theirs:8.3f} {ours:8.3f} {b[f'{name}_ratio']:7.1f}"
-    for key, label in (("render", "pixels"), ("vision", "looking"), ("estimate", "estimating"), ("frame", "a frame")):
-        theirs, ours = b[f"{key}_us"], b[f"our_{key}_us"]
+        yield f"    {name + ' RMS, on our frames [m]':44s} {theirs:8.3f} {ours:8.3f} {b[f'{name}_ratio']:7.1f}"
+    for name in ("range", "height", "lateral"):
+        theirs, ours = b[f"own_frames_{name}_rms_m"], b[f"our_{name}_rms_m"]
+        yield f"    {name + ' RMS, on its own [m]':44s} {theirs:8.3f} {ours:8.3f} {b[f'own_frames_{name}_ratio']:7.1f}"
+    on_board, our_on_board = (b[f"{whose}vision_us"] + b[f"{whose}estimate_us"] for whose in ("", "our_"))
+    for label, theirs, ours in (
+        ("pixels", b["own_render_us"], b["our_render_us"]),
+        ("looking", b["vision_us"], b["our_vision_us"]),
+        ("estimating", b["estimate_us"], b["our_estimate_us"]),
+        ("a frame", b["frame_us"], b["our_frame_us"]),
+        ("  the same, given our full frames", b["render_us"] + on_board, b["our_frame_us"]),
+        ("  of it on board, pixels given", on_board, our_on_board),
+    ):
         yield f"    {label + ' [us CPU]':44s} {theirs:8.0f} {ours:8.0f} {theirs / ours:7.1f}"
-    theirs, ours = (b[f"{whose}vision_us"] + b[f"{whose}estimate_us"] for whose in ("", "our_"))
-    yield f"    {'  of it on board, pixels given [us CPU]':44s} {theirs:8.0f} {ours:8.0f} {theirs / ours:7.1f}"
 
 
 def _bound(bound: Mapping[str, Any]) -> Iterator[str]:
