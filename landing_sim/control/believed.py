@@ -6,15 +6,16 @@ import math
 from collections.abc import Callable
 from functools import lru_cache
 from operator import itemgetter
-from typing import NamedTuple
 
+from landing_sim.records import record
 from landing_sim.signals import Estimate
 
 NAMES = ("u", "v", "w", "p", "q", "r", "phi", "theta", "psi", "x", "y", "H", "wx", "wy", "wz")
 _WIND = ("wx", "wy", "wz")
 
 
-class Believed(NamedTuple):
+@record
+class Believed:
     """The estimate as plain floats, SI and rad; wind zero if it is not estimated."""
 
     u: float
@@ -34,7 +35,8 @@ class Believed(NamedTuple):
     wz: float
 
 
-class Motion(NamedTuple):
+@record
+class Motion:
     """What follows from Believed: velocity over the ground in R and velocity through the air in B [m/s]."""
 
     x_dot: float
@@ -57,7 +59,7 @@ def _picked(names: tuple[str, ...]) -> Callable[[list[float]], tuple[float, ...]
 def believed(estimate: Estimate) -> Believed:
     """Raises     ValueError if a state other than the wind is not estimated."""
     values = _picked(estimate.names)(estimate.mean.tolist())
-    return Believed._make(values if len(values) == len(NAMES) else _with_wind(estimate, values))
+    return Believed(*(values if len(values) == len(NAMES) else _with_wind(estimate, values)))
 
 
 def _with_wind(estimate: Estimate, values: tuple[float, ...]) -> tuple[float, ...]:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from landing_sim.control.believed import Believed, Motion
 from landing_sim.control.settings import RolloutSettings
 from landing_sim.control.tables import interpolate
+from landing_sim.records import record
 from landing_sim.signals import Reference
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class RolloutMemory:
     """What the schedules have reached: attitude [rad], elevator [rad] without feedback, mean brake."""
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -25,6 +26,10 @@ class Schedule:
 
     at: tuple[float, ...]
     rows: tuple[np.ndarray, ...]
+    steps: tuple[np.ndarray, ...] = field(init=False)  # from each row to the next
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "steps", tuple(b - a for a, b in pairwise(self.rows)))
 
     def __call__(self, airspeed: float) -> list[float]:
         if airspeed <= self.at[0]:
@@ -33,4 +38,4 @@ class Schedule:
             return self.rows[-1].tolist()
         i = bisect_right(self.at, airspeed) - 1
         part = (airspeed - self.at[i]) / (self.at[i + 1] - self.at[i])
-        return (self.rows[i] + part * (self.rows[i + 1] - self.rows[i])).tolist()
+        return (self.rows[i] + part * self.steps[i]).tolist()
