@@ -61,7 +61,7 @@ def project(
 
     camera (6,): f, cx, cy [px], width, height, blur sigma [px].
     Fills
-        lines (m, 4, 4) in table units; last, the weight of the corner between this edge and the next
+        lines (m, 4, 4) in table units; last, room for the weight of the corner between this edge and the next
         seen (m, 5) material of each, then the first and last column and row that it may touch
         horizon (5,) gradient and offset of the z component (frame R) of the ray (x, y, 1) of pixel (u, v), sine of the
         dip, bound of the gradient of `_dip_function`
@@ -106,10 +106,7 @@ def project(
             lines[count, i, 1] = b * scale
             lines[count, i, 2] = c * scale + TABLE_HALF
         if above:
-            for i in range(4):
-                k = (i + 1) & 3
-                dot = lines[count, i, 0] * lines[count, k, 0] + lines[count, i, 1] * lines[count, k, 1]
-                lines[count, i, 3] = 2.0 / math.pi * math.asin(min(max(dot / (units * units), -1.0), 1.0))
+            lines[count, 0, 3] = math.nan  # asked for by few: see `_corners`
             seen[count, 0] = material[m]
             seen[count, 1] = seen[count, 3] = -FAR
             seen[count, 2] = seen[count, 4] = FAR
@@ -233,6 +230,15 @@ def _draw_horizon(
 
 
 @kernel
+def _corners(line: Array, units: float) -> None:
+    """Fill in the weights of the corners between each edge and the next: line[:, 3], NaN until somebody draws them."""
+    for i in range(4):
+        k = (i + 1) & 3
+        dot = line[i, 0] * line[k, 0] + line[i, 1] * line[k, 1]
+        line[i, 3] = 2.0 / math.pi * math.asin(min(max(dot / (units * units), -1.0), 1.0))
+
+
+@kernel
 def _draw_quad(
     block: Array, w: int, h: int, u0: int, v0: int, line: Array, box: np.ndarray, mask: int, grey: float, below: float,
     table: Array,
@@ -350,6 +356,8 @@ def shade(
                         block[r, c] = palette[base[k]]
             for j in range(first[k], counts[k]):
                 m = active[k, j]
+                if math.isnan(lines[k, m, 0, 3]):
+                    _corners(lines[k, m], TABLE_HALF / (CUT * camera[5]))
                 grey = palette[seen[k, m, 0]]
                 below = palette[SURFACE] if seen[k, m, 0] == PAINT else -1.0
                 _draw_quad(block, bw, bh, u0, v0, lines[k, m], seen[k, m], edges[k, j], grey, below, table)
