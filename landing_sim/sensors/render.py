@@ -15,7 +15,8 @@ import numpy as np
 
 from landing_sim.geometry.pinhole import Intrinsics
 from landing_sim.sensors import render_cv2
-from landing_sim.sensors.render_kernels import TILE, edge_table, project
+from landing_sim.sensors.render_kernels import TILE
+from landing_sim.sensors.render_lines import edge_table, project
 from landing_sim.sensors.render_noise import develop_frame, developed, gaussian_quantiles
 from landing_sim.sensors.render_windows import shade_windows
 from landing_sim.signals import CameraTruth

@@ -12,7 +12,7 @@ import numpy as np
 
 from landing_sim.geometry.so3 import turned
 from landing_sim.jit import kernel
-from landing_sim.sensors.render_kernels import TABLE_HALF
+from landing_sim.sensors.render_lines import TABLE_HALF
 from landing_sim.types import Array
 
 SHIFT = 8  # fractional bits of OpenCV's fixed-point coordinates
@@ -92,7 +92,7 @@ def paint(
 ) -> None:
     """Draw the scene over `image` (height, width) uint8, which holds the sky, bottom layer first.
 
-    lines, horizon, camera as in `render_kernels.project`; colours (count,) of the quadrilaterals and `ground` are
+    lines, horizon, camera as in `render_lines.project`; colours (count,) of the quadrilaterals and `ground` are
     values 0..255.
     """
     import cv2
