@@ -18,7 +18,8 @@ from landing_sim.papers import dickmanns_figures as figures
 from landing_sim.papers import measures as m
 from landing_sim.papers.claims import Claim, Measured
 from landing_sim.papers.flights import Flown, Run
-from landing_sim.record.log import FlightLog, LogBuilder
+from landing_sim.record.builder import LogBuilder
+from landing_sim.record.log import FlightLog
 
 # ------------------------------------------------------------------------------------------ synthetic flights
 

@@ -19,8 +19,9 @@ from landing_sim.papers import gibert_trials as g
 from landing_sim.papers.academic_example import Trial, settings
 from landing_sim.papers.courses import Course, largest_step, rms_between, settling
 from landing_sim.papers.flights import Flown, Run
+from landing_sim.record.builder import LogBuilder
 from landing_sim.record.judge import outcome
-from landing_sim.record.log import FlightLog, LogBuilder
+from landing_sim.record.log import FlightLog
 
 JOBS = claims.runs_of(paper.CLAIMS)
 

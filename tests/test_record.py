@@ -18,7 +18,8 @@ import synthetic_flight as synthetic
 from landing_sim.geometry.pinhole import Intrinsics, project
 from landing_sim.geometry.so3 import camera_from_body, from_euler
 from landing_sim.record import judge, overlay, parquet, replay
-from landing_sim.record.log import FlightLog, LogBuilder, LogError
+from landing_sim.record.builder import LogBuilder
+from landing_sim.record.log import FlightLog, LogError
 from landing_sim.record.poses import quaternions
 from landing_sim.signals import Estimate, Feature, Residuals, Status, Touchdown
 

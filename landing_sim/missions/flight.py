@@ -11,6 +11,7 @@ from landing_sim.errors import Mark, Problem, ScenarioError
 from landing_sim.interfaces import Controller, Estimator, FrontEnd, Guidance, Plant, Sensor, World
 from landing_sim.plants.jsbsim import PlantError
 from landing_sim.record import judge, log
+from landing_sim.record.builder import LogBuilder
 from landing_sim.signals import Command, Step, Touchdown
 
 AnyPlant = TypeVar("AnyPlant", bound=Plant)
@@ -74,7 +75,7 @@ def ready(name: str, build: Callable[[], AnyMission]) -> AnyMission:
 
 
 def finished(
-    builder: log.LogBuilder, scenario: Any, outcome: Outcome, runway: Mapping[str, float] | None = None
+    builder: LogBuilder, scenario: Any, outcome: Outcome, runway: Mapping[str, float] | None = None
 ) -> log.FlightLog:
     """The log of a flight that is over."""
     return builder.finish(

@@ -15,6 +15,7 @@ from landing_sim.interfaces import NoiseStream
 from landing_sim.missions.flight import Flight, finished, ready
 from landing_sim.missions.lunar_landing import Mission, build
 from landing_sim.record import judge, log
+from landing_sim.record.builder import LogBuilder
 from landing_sim.sections.lunar import LunarScenario
 from landing_sim.sensors.optic_flow import FlowReading
 from landing_sim.sensors.optic_flow_picture import picture
@@ -43,7 +44,7 @@ def fly(
     """
     started = time.perf_counter()
     mission = ready(scenario.name, lambda: build(scenario, scenario.seed, scenario.run, noise))
-    builder, readings = log.LogBuilder(), []
+    builder, readings = LogBuilder(), []
     recorder, due = None, 0.0
     camera = Intrinsics.centred(*PICTURE)
     if recording is not None:

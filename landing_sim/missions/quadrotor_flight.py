@@ -14,6 +14,7 @@ from landing_sim.interfaces import NoiseStream
 from landing_sim.missions.flight import Flight, finished, ready
 from landing_sim.missions.quadrotor_landing import Mission, build
 from landing_sim.record import judge, log
+from landing_sim.record.builder import LogBuilder
 from landing_sim.sections.quadrotor import METRICS, QuadrotorScenario
 from landing_sim.signals import Step
 from landing_sim.types import Array
@@ -46,7 +47,7 @@ def fly(
     """
     started = time.perf_counter()
     mission = ready(scenario.name, lambda: build(scenario, scenario.seed, scenario.run, noise))
-    builder, told = log.LogBuilder(), []
+    builder, told = LogBuilder(), []
     camera = None
     if recording is not None:
         from landing_sim.missions.quadrotor_pictures import Pictures

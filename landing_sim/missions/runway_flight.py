@@ -15,6 +15,7 @@ from landing_sim.interfaces import NoiseStream
 from landing_sim.missions.flight import Flight, finished, ready
 from landing_sim.missions.runway_landing import build
 from landing_sim.record import judge, log
+from landing_sim.record.builder import LogBuilder
 from landing_sim.record.overlay import BelievedCamera
 from landing_sim.scenario import Scenario
 from landing_sim.signals import Step
@@ -43,7 +44,7 @@ def fly(
 
         recorder = Recorder(recording, scene(scenario, vehicle), scenario.record.frames_hz, live)
         listeners.append(recorder.add)
-    builder, eyes = log.LogBuilder(), _looks(scenario)
+    builder, eyes = LogBuilder(), _looks(scenario)
     sights = None
     if eyes:
         from landing_sim.record.sights import Sights

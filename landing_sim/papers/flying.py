@@ -16,7 +16,8 @@ from landing_sim.missions import runway_landing
 from landing_sim.noise import Noise
 from landing_sim.papers.flights import Flown, Run
 from landing_sim.papers.pilot import Eyes, PilotController, PilotGuidance
-from landing_sim.record.log import FlightLog, LogBuilder
+from landing_sim.record.builder import LogBuilder
+from landing_sim.record.log import FlightLog
 from landing_sim.sensors.reference import (
     DifferentialGps,
     DifferentialGpsConfig,

@@ -25,6 +25,7 @@ from landing_sim.missions.flight import finished
 from landing_sim.missions.runway_landing import RunwayParts
 from landing_sim.plants.aircraft import JsbsimPlant
 from landing_sim.record import judge, log
+from landing_sim.record.builder import LogBuilder
 from landing_sim.scenario import Scenario
 from landing_sim.signals import Command, Step
 from landing_sim.vehicle import Vehicle
@@ -73,7 +74,7 @@ def land(
     recording: Path | None = None,
     prepare: Callable[[RunwayParts], None] | None = None,
     watch: Callable[[Step], None] | None = None,
-    builder: log.LogBuilder | None = None,
+    builder: LogBuilder | None = None,
 ) -> Landing:
     """What `runner.fly` does, with a stop watch; `prepare` may look into the parts before they fly."""
     begun = Cost.now()
@@ -97,7 +98,7 @@ def land(
 
         recorder = Recorder(recording, runway_flight.scene(scenario, vehicle), scenario.record.frames_hz)
     opening = Cost.now() - before
-    builder = log.LogBuilder() if builder is None else builder
+    builder = LogBuilder() if builder is None else builder
     for step in mission.steps():
         builder.add(step)
         if watch is not None:

@@ -18,7 +18,7 @@ from typing import Any
 from bench_parts.flights import land
 from landing_sim.missions import runway_landing
 from landing_sim.missions.runway_landing import RunwayParts
-from landing_sim.record.log import LogBuilder
+from landing_sim.record.builder import LogBuilder
 from landing_sim.scenario import Scenario
 from landing_sim.sensors.render import RenderedFrame
 from landing_sim.vehicle import Vehicle
