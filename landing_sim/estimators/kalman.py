@@ -73,13 +73,13 @@ def own_blocks(M: Array, starts: Array) -> Array:
 
 @kernel
 def predict_dense(P: Array, Phi: Array, Qd: Array, starts: Array) -> Array:
-    """P- = Phi P+ Phi' + Qd within each block (eq. 9); Qd is symmetric.
+    """P- = Phi P+ Phi' + Qd (eq. 9), blocks kept apart; P and Qd are symmetric and couple none.
 
     Row by row, each from its beginning, so that the processor takes several of its entries at a time; most of Phi is zero
     and left out, which changes no bit.
     """
     n = P.shape[0]
-    P, Phi, Qd = own_blocks(P, starts), own_blocks(Phi, starts), own_blocks(Qd, starts)
+    Phi = own_blocks(Phi, starts)
     T = np.zeros((n, n))  # Phi P+
     for i in range(n):
         for k in range(n):
