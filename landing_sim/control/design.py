@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -63,9 +64,9 @@ class LinearModel:
         return LinearModel(airspeed, flight_path, mass, state, np.array([elevator, thrust, 0.0, 0.0]), A, B)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class AxisDesign:
-    """One half of the aircraft at one trim point."""
+    """One half of the aircraft at one trim point. What has become of it is worked out when asked for: no flight does."""
 
     states: tuple[str, ...]
     inputs: tuple[str, ...]
@@ -73,9 +74,25 @@ class AxisDesign:
     B: Array
     K_d: Array  # prescribed eigenstructure alone
     solution: Solution
-    modes: tuple[Achieved, ...]
-    open_loop: np.ndarray  # eigenvalues without the integrals and positions
-    margins: Margins
+    wanted: tuple[Mode, ...]
+    scale: Array  # typical sizes of the states
+    authority: Array  # of the inputs
+    delay: float  # [s] of the loop
+    lags: tuple[float, ...]  # [s] of the actuators
+
+    @cached_property
+    def modes(self) -> tuple[Achieved, ...]:
+        return achieved(self.A, self.B, self.solution.K, self.wanted, self.states, self.scale)
+
+    @cached_property
+    def open_loop(self) -> np.ndarray:
+        """Eigenvalues without the integrals and positions."""
+        physical = [k for k, name in enumerate(self.states) if name not in ("y", "H", "psi", "int_V", "int_H")]
+        return np.linalg.eigvals(self.A[np.ix_(physical, physical)])
+
+    @cached_property
+    def margins(self) -> Margins:
+        return margins(self.A, self.B, self.solution.K, self.delay, self.lags, self.inputs, self.authority)
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,18 +191,7 @@ def _axis(
     scaled = follow(A / scale[:, None] * scale, B / scale[:, None], K_d @ S, weight,
                     np.diag((scale / tolerance) ** 2), weight, axis.rho)  # fmt: skip
     solution = Solution(scaled.K / scale, scaled.P / scale[:, None] / scale, scaled.residual)
-    physical = [states.index(name) for name in states if name not in ("y", "H", "psi", "int_V", "int_H")]
-    return AxisDesign(
-        states,
-        inputs,
-        A,
-        B,
-        K_d,
-        solution,
-        achieved(A, B, solution.K, modes, states, scale),
-        np.linalg.eigvals(A[np.ix_(physical, physical)]),
-        margins(A, B, solution.K, delay, lags, inputs, authority),
-    )
+    return AxisDesign(states, inputs, A, B, K_d, solution, modes, scale, authority, delay, lags)
 
 
 def _by_name(values: dict[str, float], names: tuple[str, ...], what: str) -> Array:

@@ -20,7 +20,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.linalg import null_space, solve_continuous_are
-from scipy.optimize import linear_sum_assignment
 
 from landing_sim.types import Array
 
@@ -156,6 +155,8 @@ def achieved(
     A: Array, B: Array, K: Array, modes: Sequence[Mode], names: Sequence[str], scale: Array
 ) -> tuple[Achieved, ...]:
     """The modes of A - B K, each paired with the mode asked for that it is nearest to in eigenvalue and shape."""
+    from scipy.optimize import linear_sum_assignment  # a tenth of a second that no flight needs
+
     values, vectors = np.linalg.eig(A - B @ K)
     vectors = vectors / scale[:, None]
     slots = [(mode, s) for mode in modes for s in ((mode.eigenvalue, mode.eigenvalue.conjugate())[: mode.order])]
@@ -260,6 +261,8 @@ def _wanted(mode: Mode, names: Sequence[str], scale: Array) -> tuple[np.ndarray,
 
 def _tracked_eigenvalues(L: np.ndarray) -> np.ndarray:
     """Eigenvalues of L (k, m, m), each column one continuous branch."""
+    from scipy.optimize import linear_sum_assignment
+
     branches = np.linalg.eigvals(L)
     for k in range(1, len(branches)):
         cost = np.abs(branches[k - 1][:, None] - branches[k][None, :])
