@@ -163,7 +163,7 @@ def innovation_variance(P: Array, Hn: Array, R: Array) -> Array:
 
 @kernel
 def update_dense(P: Array, Hn: Array, R: Array, nu: Array, use: Array, starts: Array) -> tuple[Array, Array, float]:
-    """Sequential update; P is changed in place. Returns P, dx (n,), and the normalised innovation squared."""
+    """Sequential update; P, symmetric, is changed in place. Returns P, dx (n,), the normalised innovation squared."""
     n = P.shape[0]
     dx, PH, own = np.zeros(n), np.empty(n), np.zeros(n)
     nis = 0.0
@@ -178,7 +178,7 @@ def update_dense(P: Array, Hn: Array, R: Array, nu: Array, use: Array, starts: A
             h = Hn[i, b]
             if h != 0.0:
                 for a in range(n):
-                    PH[a] += P[b, a] * h  # P is symmetric: its rows are its columns
+                    PH[a] += P[b, a] * h  # a row of P is a column
         for a in range(n):
             s += Hn[i, a] * PH[a]
             e -= Hn[i, a] * dx[a]
