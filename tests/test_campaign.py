@@ -433,9 +433,11 @@ def test_a_dask_worker_never_compiles(tmp_path: Path, monkeypatch: pytest.Monkey
 
 @pytest.mark.slow
 @needs_dask
+@pytest.mark.parametrize("workers", [1, 2])
 def test_dask_workers_fly_the_same_bits_and_one_killed_loses_nothing(
-    campaign: Path, flown: Path, tmp_path: Path
+    workers: int, campaign: Path, flown: Path, tmp_path: Path
 ) -> None:
+    """With a single one, nobody else holds what it was told."""
     from distributed import LocalCluster
 
     killed = []
@@ -445,7 +447,7 @@ def test_dask_workers_fly_the_same_bits_and_one_killed_loses_nothing(
             killed.append(int(progress.latest.worker.rpartition(":")[2]))
             os.kill(killed[0], signal.SIGKILL)
 
-    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+    with LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
         plan = file.load(campaign)
         assert run.fly(plan, tmp_path / "o", cluster=cluster.scheduler_address, watch=kill_one) == []
     assert killed

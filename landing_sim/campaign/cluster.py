@@ -45,13 +45,13 @@ def run(function: Callable[[Job], Value], jobs: Iterable[Job], address: str) -> 
         raise _wrong(address, f"no scheduler with workers there: {error}") from None
     try:
         _check(client, address)
-        scattered = client.scatter(function, broadcast=True, hash=False)
         waiting = iter(jobs)
         flying: dict[Any, Any] = {}
 
         def submit(count: int) -> list[Any]:
             for job in itertools.islice(waiting, count):
-                future = client.submit(_call, scattered, job, pure=False)
+                # the function goes with every job: scattered, it dies with the last worker that happens to hold it
+                future = client.submit(_call, function, job, pure=False)
                 flying[future.key] = (future, job)
                 futures.add(future)
             return list(flying)
