@@ -99,7 +99,7 @@ def test_an_approach_that_never_finds_the_runway_climbs_away() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "seed"), [("transport/turbulence", 1), ("transport/turbulence", 2), ("transport/gibert_far", 1)]
+    ("name", "seed"), [*(("transport/turbulence", seed) for seed in (1, 2, 3)), ("transport/gibert_far", 1)]
 )
 def test_who_never_sees_the_runway_climbs_away_with_wings_level(name: str, seed: int) -> None:
     """In turbulence, by gyros or an inertial unit and airspeed, until it has flown past where the runway must be."""

@@ -59,8 +59,8 @@ _STILL = np.zeros(3)
 
 
 class Memory(NamedTuple):
-    """All that the filter remembers; never changed in place. A tuple: four or five are made a cycle, those by readings and
-    by time by position, which costs half of `_replace`."""
+    """All that the filter remembers; never changed in place. A tuple: four or five are made a cycle, those of every
+    cycle by position, which costs half of `_replace`."""
 
     t: float
     valid: bool

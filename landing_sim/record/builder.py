@@ -112,13 +112,13 @@ class LogBuilder:
 
     def _look(self, edges: EdgeSet, z: Array, seen: Residuals | None) -> None:
         """The windows of one image, with the estimator's verdict where it is about these."""
-        judged = seen is not None and len(seen.status) == len(z)
+        judged = seen if seen is not None and len(seen.status) == len(z) else None
         self._looks.append((len(self._modes), len(z)))
         self._feature.frombytes(edges.feature.tobytes())
-        self._status.frombytes((seen.status if seen is not None and judged else edges.status).tobytes())
+        self._status.frombytes((edges.status if judged is None else judged.status).tobytes())
         self._uv.frombytes(edges.centre.tobytes())
         self._z.frombytes(z.tobytes())
-        innovation = seen.innovation if seen is not None and judged else np.full(len(z), np.nan)
+        innovation = np.full(len(z), np.nan) if judged is None else judged.innovation
         self._innovation.frombytes(innovation.tobytes())
 
     def finish(

@@ -50,7 +50,7 @@ def project(
         lines (m, 4, 4) in table units; last, room for the weight of the corner between this edge and the next
         seen (m, 5) material of each, then the first and last column and row that it may touch
         horizon (5,) gradient and offset of the z component (frame R) of the ray (x, y, 1) of pixel (u, v), sine of the
-        dip, bound of the gradient of `_dip_function`
+        dip, bound of the gradient of `render_kernels._dip_function`
     Returns the number of quadrilaterals kept: those in front of the camera, near the image and seen from above.
     """
     f, cx, cy = camera[0], camera[1], camera[2]

@@ -17,7 +17,6 @@ from landing_sim.world.runway import GRASS, SKY
 
 NEAR = 1.0  # [m] polygons are cut off there
 SHIFT = 4  # fractional bits of cv2's corners
-FAR = 8000.0  # [px] cv2's fixed point overflows beyond
 Array = np.ndarray
 
 
@@ -66,4 +65,4 @@ def artist(scenario: Scenario) -> Callable[[Array, Array], np.ndarray]:
 
 def _fixed(uv: Array) -> np.ndarray:
     """(n, 2) pixels as cv2's fixed-point corners."""
-    return np.rint(np.clip(uv, -FAR, FAR) * (1 << SHIFT)).astype(np.int32)
+    return np.rint(uv * (1 << SHIFT)).astype(np.int32)
