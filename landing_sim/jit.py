@@ -44,6 +44,15 @@ def kernel(function: F) -> F:
     return numba.njit(cache=True, fastmath=False, error_model="numpy", no_cfunc_wrapper=True)(function)  # type: ignore[no-any-return]
 
 
+def uncounted(function: F) -> F:
+    """`kernel` for what neither makes an array nor returns one: it does not count references to those it is given.
+
+    Each count is an atomic operation, and numba counts at every call of a small kernel and at every row taken of an array:
+    a sixth of all time in kernels. numba itself refuses to compile one that makes an array, or calls a kernel that does.
+    """
+    return numba.njit(cache=True, fastmath=False, error_model="numpy", no_cfunc_wrapper=True, _nrt=False)(function)  # type: ignore[no-any-return]
+
+
 def direct(compiled: Callable[..., Any]) -> Callable[..., Any]:
     """What calls a kernel without the dispatcher's look at the types of its arguments, half of what a small call costs.
 

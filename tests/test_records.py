@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import copy
+import importlib
+import inspect
 import pickle
+import pkgutil
+import sys
 from collections.abc import Mapping
 from dataclasses import FrozenInstanceError, asdict, dataclass, field, fields, replace
 
 import numpy as np
 import pytest
 
-from landing_sim.jit import direct, kernel
+import landing_sim
+from landing_sim.jit import direct, kernel, uncounted
 from landing_sim.records import record
 
 
@@ -92,3 +97,37 @@ def test_a_kernel_is_called_directly_once_it_is_compiled_for_one_type_alone() ->
         straight(x)
     scaled(np.array([3], dtype=np.int64), 2.0)
     assert direct(scaled) is scaled
+
+
+@uncounted
+def total(x: np.ndarray) -> float:
+    row = x[1:]  # a view, which `kernel` would count
+    return float(row[0] + row[1])
+
+
+def test_an_uncounted_kernel_leaves_what_it_is_given_as_often_referred_to_as_before() -> None:
+    x = np.arange(3.0)
+    before = sys.getrefcount(x)
+    assert total(x) == 3.0
+    assert sys.getrefcount(x) == before
+
+
+def test_an_uncounted_kernel_that_makes_an_array_is_refused() -> None:
+    @uncounted
+    def makes(x: np.ndarray) -> float:
+        return float(np.zeros(3)[0] + x[0])
+
+    with pytest.raises(Exception, match="array passed into the function"):
+        makes(np.zeros(1))
+
+
+def test_no_uncounted_kernel_returns_an_array_that_nobody_would_hold() -> None:
+    found = 0
+    for module in pkgutil.walk_packages(landing_sim.__path__, "landing_sim."):
+        for name, thing in vars(importlib.import_module(module.name)).items():
+            if getattr(thing, "targetoptions", {}).get("_nrt") is False:
+                found += 1
+                returned = str(inspect.signature(thing.py_func).return_annotation)
+                assert all(part in {"tuple", "float", "int", "bool", "None", "np.uint64", "Vector"} for part in
+                           returned.replace("[", ",").replace("]", "").replace(" ", "").split(",")), (name, returned)  # fmt: skip
+    assert found > 30

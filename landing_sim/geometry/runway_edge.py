@@ -20,7 +20,7 @@ import numpy as np
 
 from landing_sim.geometry.runway_image import EARTH_RADIUS, HORIZON, LEFT, RIGHT, THRESHOLD, horizon_dip, plane
 from landing_sim.geometry.so3 import back, turned
-from landing_sim.jit import kernel
+from landing_sim.jit import kernel, uncounted
 from landing_sim.types import Array
 
 BY_X, BY_Y, BY_H, BY_PHI, BY_THETA, BY_PSI, BY_PAN, BY_TILT, BY_WIDTH = range(9)  # columns of the derivatives
@@ -39,7 +39,7 @@ def turning_axes(phi: float, theta: float, pan: float) -> Array:
     return axes
 
 
-@kernel
+@uncounted
 def crossing(
     kind: int, cu: float, cv: float, su: float, sv: float, p_RC: Array, R_CR: Array, R_RB: Array, axes: Array,
     lever: Array, lens: Array, width: float, slope: float, J: Array, i: int,

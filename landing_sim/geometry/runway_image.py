@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from landing_sim.jit import kernel
+from landing_sim.jit import kernel, uncounted
 from landing_sim.types import Array
 
 Vector = tuple[float, float, float]
@@ -43,7 +43,7 @@ def plane_normal(feature: int, p_RC: Array, width: float, slope: float, azimuth:
     return n
 
 
-@kernel
+@uncounted
 def plane(feature: int, p_RC: Array, width: float, slope: float, azimuth: float) -> Vector:
     """`plane_normal` as three floats: hundreds are wanted a frame, and an array each would cost as much as the rest."""
     if feature == HORIZON:
@@ -65,7 +65,7 @@ def image_line(n_R: Array, R_CR: Array, f: float, cx: float, cy: float) -> Array
     return l
 
 
-@kernel
+@uncounted
 def line_of(n_R: Vector, R_CR: Array, f: float, cx: float, cy: float) -> Vector:
     """`image_line` as three floats."""
     a = R_CR[0, 0] * n_R[0] + R_CR[0, 1] * n_R[1] + R_CR[0, 2] * n_R[2]
@@ -74,7 +74,7 @@ def line_of(n_R: Vector, R_CR: Array, f: float, cx: float, cy: float) -> Vector:
     return a / f, b / f, c - (a * cx + b * cy) / f
 
 
-@kernel
+@uncounted
 def displacement(l: Array | Vector, cu: float, cv: float, su: float, sv: float) -> float:
     """Signed distance [px] from (cu, cv) to the line l along the unit vector (su, sv); inf if parallel."""
     den = l[0] * su + l[1] * sv

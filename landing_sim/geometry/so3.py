@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from landing_sim.jit import kernel
+from landing_sim.jit import kernel, uncounted
 from landing_sim.types import Array
 
 
@@ -16,10 +16,17 @@ def from_euler(phi: float, theta: float, psi: float) -> Array:
 
     Source     any flight mechanics text, e.g. Etkin 1972, eq. (4.5,3) transposed.
     """
+    R = np.empty((3, 3))
+    fill_from_euler(phi, theta, psi, R)
+    return R
+
+
+@uncounted
+def fill_from_euler(phi: float, theta: float, psi: float, R: Array) -> None:
+    """`from_euler` into R (3, 3)."""
     cph, sph = math.cos(phi), math.sin(phi)
     cth, sth = math.cos(theta), math.sin(theta)
     cps, sps = math.cos(psi), math.sin(psi)
-    R = np.empty((3, 3))
     R[0, 0] = cth * cps
     R[0, 1] = sph * sth * cps - cph * sps
     R[0, 2] = cph * sth * cps + sph * sps
@@ -29,17 +36,22 @@ def from_euler(phi: float, theta: float, psi: float) -> Array:
     R[2, 0] = -sth
     R[2, 1] = sph * cth
     R[2, 2] = cph * cth
-    return R
 
 
 @kernel
 def to_euler(R_RB: Array) -> Array:
     """phi, theta, psi [rad] of R_RB, (3,); theta in [-pi/2, pi/2]."""
     out = np.empty(3)
+    fill_to_euler(R_RB, out)
+    return out
+
+
+@uncounted
+def fill_to_euler(R_RB: Array, out: Array) -> None:
+    """`to_euler` into out (3,)."""
     out[0] = math.atan2(R_RB[2, 1], R_RB[2, 2])
     out[1] = math.asin(min(1.0, max(-1.0, -R_RB[2, 0])))
     out[2] = math.atan2(R_RB[1, 0], R_RB[0, 0])
-    return out
 
 
 @kernel
@@ -69,7 +81,7 @@ def product(A: Array, B: Array) -> Array:
     return out
 
 
-@kernel
+@uncounted
 def turned(R: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """R v of the vector v = (x, y, z)."""
     return (
@@ -79,7 +91,7 @@ def turned(R: Array, x: float, y: float, z: float) -> tuple[float, float, float]
     )
 
 
-@kernel
+@uncounted
 def back(R: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """R^T v of the vector v = (x, y, z)."""
     return (

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 
-from landing_sim.geometry.so3 import camera_from_body, from_euler, to_euler
-from landing_sim.jit import kernel
+from landing_sim.geometry.so3 import camera_from_body, fill_from_euler, fill_to_euler
+from landing_sim.jit import kernel, uncounted
 from landing_sim.plants.jsbsim import FT, LBF
 from landing_sim.plants.wheels import heights, reactions
 from landing_sim.types import Array
@@ -29,7 +29,7 @@ OFFSET_B = 4  # [m] of the actual cg from the nominal one
 SITE_ROWS = 5
 
 
-@kernel
+@uncounted
 def settle(
     x: float, y: float, z: float, lat: float, lon: float, altitude: float, phi: float, theta: float, psi: float,
     u: float, v: float, w: float, airspeed: float, p: float, q: float, r: float,
@@ -60,22 +60,22 @@ def settle(
     elevation = altitude * FT - (-s * at_x - c * down) / (-s * up_x - c * up_z)
 
     # from the actual to the nominal cg
-    R_NB = from_euler(phi, theta, psi)
+    R = body[R_RB : R_RB + 3]
+    fill_from_euler(phi, theta, psi, R)
     ox, oy, oz = site[OFFSET_B, 0], site[OFFSET_B, 1], site[OFFSET_B, 2]
     body[W, 0], body[W, 1], body[W, 2] = p, q, r
     body[UVW, 0] = u * FT - (q * oz - r * oy)
     body[UVW, 1] = v * FT - (r * ox - p * oz)
     body[UVW, 2] = w * FT - (p * oy - q * ox)
+    for j in range(3):
+        a, b, c = R[0, j], R[1, j], R[2, j]  # of R_NB, which becomes R_RB column by column
+        for i in range(3):
+            R[i, j] = body[R_RN + i, 0] * a + body[R_RN + i, 1] * b + body[R_RN + i, 2] * c
     for i in range(3):
-        for j in range(3):
-            body[R_RB + i, j] = (
-                body[R_RN + i, 0] * R_NB[0, j] + body[R_RN + i, 1] * R_NB[1, j] + body[R_RN + i, 2] * R_NB[2, j]
-            )
-        a, b, c = body[R_RB + i, 0], body[R_RB + i, 1], body[R_RB + i, 2]
+        a, b, c = R[i, 0], R[i, 1], R[i, 2]
         body[P, i] -= a * ox + b * oy + c * oz
         body[V, i] = a * body[UVW, 0] + b * body[UVW, 1] + c * body[UVW, 2]
 
-    R = body[R_RB : R_RB + 3]
     least = heights(body[P], R, slope, p_B, height)
     for i in range(3):
         body[WHEELS, i] = height[i]
@@ -92,7 +92,7 @@ def settle(
     return at_x, at_y, -down, airspeed * FT, elevation / FT, least, sound
 
 
-@kernel
+@uncounted
 def into_N(body: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """A vector in R as north, east, down where the body is."""
     return (
@@ -102,12 +102,11 @@ def into_N(body: Array, x: float, y: float, z: float) -> tuple[float, float, flo
     )
 
 
-@kernel
+@uncounted
 def look(body: Array, north: float, east: float, down: float) -> None:
     """Fill the rows that only a look at the truth needs: Euler angles of B in R, and the wind given in N [m/s]."""
-    euler = to_euler(body[R_RB : R_RB + 3])
+    fill_to_euler(body[R_RB : R_RB + 3], body[EULER])
     for i in range(3):
-        body[EULER, i] = euler[i]
         body[WIND, i] = body[R_RN + i, 0] * north + body[R_RN + i, 1] * east + body[R_RN + i, 2] * down
 
 

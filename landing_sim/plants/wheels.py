@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from landing_sim.jit import kernel
+from landing_sim.jit import kernel, uncounted
 from landing_sim.plants.jsbsim import PlantError
 from landing_sim.types import Array
 
@@ -73,7 +73,7 @@ def read_contacts(path: Path, origin: Array) -> Contacts:
     return Contacts(tuple(r[1] for r in rows), np.array([r[2] for r in rows]), np.array([r[3] for r in rows]))
 
 
-@kernel
+@uncounted
 def heights(p_RB: Array, R_RB: Array, slope: float, p_B: Array, out: Array) -> float:
     """Height [m] of each point p_B (n, 3) above the surface, along its normal, into out (n,); returns the least.
 
@@ -101,7 +101,7 @@ def _cross(a: Vector, b: Vector) -> Vector:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@kernel
+@uncounted
 def reactions(
     R_RB: Array, v_R: Array, w_B: Array, slope: float, brake_left: float, brake_right: float, dt: float,
     p_B: Array, values: Array, height: Array, bristle: Array, out: Array,

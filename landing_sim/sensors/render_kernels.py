@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from landing_sim.jit import kernel
+from landing_sim.jit import kernel, uncounted
 from landing_sim.sensors.render_lines import CUT, TABLE_HALF, TABLE_SIZE, fill_corners
 from landing_sim.sensors.render_noise import develop, develop_flat, stream_of
 from landing_sim.types import Array
@@ -28,7 +28,7 @@ TILE = 128, 16  # [px] width and height of the blocks that a full frame is made 
 SKY, GRASS, SURFACE, PAINT = 0, 1, 2, 3  # as in world.runway
 
 
-@kernel
+@uncounted
 def _dip_function(u: float, v: float, horizon: Array, camera: Array) -> tuple[float, float, float]:
     """F = r_z - sin(dip) |r| of the ray through (u, v), > 0 below the horizon, and its gradient per pixel.
 
@@ -42,7 +42,7 @@ def _dip_function(u: float, v: float, horizon: Array, camera: Array) -> tuple[fl
     return value, horizon[0] - k * x, horizon[1] - k * y
 
 
-@kernel
+@uncounted
 def _side(uc: float, vc: float, hu: float, hv: float, horizon: Array, camera: Array) -> int:
     """SKY or GRASS if a block of half sizes hu, hv around (uc, vc) shows only that, -1 if it may show the horizon."""
     margin = (CUT * camera[5] + 1e-3) * horizon[4]
@@ -58,7 +58,7 @@ def _side(uc: float, vc: float, hu: float, hv: float, horizon: Array, camera: Ar
     return -1
 
 
-@kernel
+@uncounted
 def _classify(
     u0: int, v0: int, w: int, h: int, lines: Array, seen: np.ndarray, count: int, horizon: Array, camera: Array,
     active: np.ndarray, edges: np.ndarray,
@@ -96,7 +96,7 @@ def _classify(
     return _side(uc, vc, hu, hv, horizon, camera), first
 
 
-@kernel
+@uncounted
 def _beyond(x: float, table: Array) -> float:
     """Fraction beyond the edge at x table units: piecewise linear, exactly 1 below 0 and 0 above TABLE_SIZE."""
     if x <= 0.0:
@@ -107,7 +107,7 @@ def _beyond(x: float, table: Array) -> float:
     return table[i] + (x - i) * (table[i + 1] - table[i])
 
 
-@kernel
+@uncounted
 def _draw_horizon(
     block: Array, w: int, h: int, u0: int, v0: int, horizon: Array, camera: Array, palette: Array, table: Array
 ) -> None:
@@ -129,7 +129,7 @@ def _draw_horizon(
             block[r, c] = (1.0 - beyond) * ground + beyond * sky
 
 
-@kernel
+@uncounted
 def _draw_quad(
     block: Array, w: int, h: int, u0: int, v0: int, line: Array, box: np.ndarray, mask: int, grey: float, below: float,
     table: Array,
@@ -176,12 +176,14 @@ def _draw_quad(
                 inside_hi = 0
         if inside_lo >= inside_hi:
             inside_lo = inside_hi = hi
-        for c in range(inside_lo, inside_hi):
-            block[r, c] = grey if below < 0.0 else block[r, c] + (grey - below)
+        covered = block[r, inside_lo:inside_hi]
+        for c in range(len(covered)):
+            covered[c] = grey if below < 0.0 else covered[c] + (grey - below)
         start, stop = lo, inside_lo
         for _ in range(2):
-            for c in range(start, stop):
-                u = u0 + c
+            edge = block[r, start:stop]
+            for c in range(len(edge)):
+                u = u0 + start + c
                 q0, q1 = _beyond(a0 * u + e0, table), _beyond(a1 * u + e1, table)
                 q2, q3 = _beyond(a2 * u + e2, table), _beyond(a3 * u + e3, table)
                 across, along = max(0.0, 1.0 - (q0 + q2)), max(0.0, 1.0 - (q1 + q3))
@@ -192,7 +194,7 @@ def _draw_quad(
                     weight = (q0 * (q1 * w01 + q3 * w30) + q2 * (q1 * w12 + q3 * w23)) / both
                     bound = min(across, along) if weight > 0.0 else max(0.0, across + along - 1.0)
                     alpha += abs(weight) * (bound - alpha)
-                block[r, c] += alpha * (grey - (block[r, c] if below < 0.0 else below))
+                edge[c] += alpha * (grey - (edge[c] if below < 0.0 else below))
             start, stop = inside_hi, hi
 
 
@@ -217,11 +219,26 @@ def shade(
             u0, v0 = corners[i, 0], corners[i, 1]
             if u0 < 0 or v0 < 0 or u0 + w > width or v0 + h > height:
                 return False
-    subs = counts.shape[0]
     active, edges = np.empty(seen.shape[:2], np.int64), np.empty(seen.shape[:2], np.int64)
-    base, first = np.empty(subs, np.int64), np.empty(subs, np.int64)
+    base, first = np.empty(len(counts), np.int64), np.empty(len(counts), np.int64)
     block, total, noise, hashes = np.empty((h, w)), np.empty((h, w)), np.empty(w + 6), np.empty((w + 6) >> 2, np.uint64)
-    stream = stream_of(key, index)
+    _shade(
+        out, corners, w, h, looked, whole, lines, seen, counts, horizon, camera, palette, lens, table, quantiles, greys,
+        stream_of(key, index), active, edges, base, first, block, total, noise, hashes,
+    )  # fmt: skip
+    return True
+
+
+@uncounted
+def _shade(
+    out: np.ndarray, corners: np.ndarray, w: int, h: int, looked: np.ndarray, whole: bool,
+    lines: Array, seen: np.ndarray, counts: np.ndarray, horizon: Array, camera: Array, palette: Array, lens: Array,
+    table: Array, quantiles: np.ndarray, greys: np.ndarray, stream: np.uint64,
+    active: np.ndarray, edges: np.ndarray, base: np.ndarray, first: np.ndarray,
+    block: Array, total: Array, noise: Array, hashes: np.ndarray,
+) -> None:  # fmt: skip
+    """`shade` with its working space: from `active` on, as it is made there."""
+    width, height, subs = int(camera[3]), int(camera[4]), len(counts)
     for i in range(corners.shape[0]):
         u0, v0 = corners[i, 0], corners[i, 1]
         r0, c0 = (v0, u0) if whole else (i * h, 0)
@@ -258,4 +275,3 @@ def shade(
                         total[r, c] = block[r, c] / subs + (total[r, c] if k else 0.0)
         drawn = total if subs > 1 else block
         develop(out, r0, c0, drawn, bw, bh, u0, v0, stream, lens, quantiles, noise)
-    return True

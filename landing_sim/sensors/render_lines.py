@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from landing_sim.geometry.runway_image import horizon_dip
-from landing_sim.jit import kernel
+from landing_sim.jit import kernel, uncounted
 from landing_sim.types import Array
 
 CUT = 4.0  # [sigma] half width of an edge's profile
@@ -114,7 +114,7 @@ def project(
     return count
 
 
-@kernel
+@uncounted
 def fill_corners(line: Array, units: float) -> None:
     """Fill in the weights of the corners between each edge and the next: line[:, 3], NaN until somebody draws them."""
     for i in range(4):

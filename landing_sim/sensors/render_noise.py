@@ -6,7 +6,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from landing_sim.jit import kernel
+from landing_sim.jit import kernel, uncounted
 from landing_sim.types import Array
 
 QUANTILES = 65536  # 16 bits of hash a pixel
@@ -41,7 +41,7 @@ def stream_of(key: np.uint64, index: int) -> np.uint64:
     return mix(mix(key) + np.uint64(index) * np.uint64(0xD1B54A32D192ED03))
 
 
-@kernel
+@uncounted
 def develop(
     out: np.ndarray, r0: int, c0: int, block: Array, w: int, h: int, u0: int, v0: int, stream: np.uint64, lens: Array,
     quantiles: np.ndarray, noise: Array,
@@ -63,13 +63,14 @@ def develop(
                 counter += np.uint64(0x9E3779B97F4A7C15)
                 for lane in range(4):
                     noise[4 * g + lane] = sigma * quantiles[(bits >> np.uint64(16 * lane)) & np.uint64(0xFFFF)]
+        row, drawn = out[r0 + r, c0 : c0 + w], noise[skip : skip + w]
         for c in range(w):
-            value = block[r, c] * gain + offset + noise[skip + c] + 0.5
+            value = block[r, c] * gain + offset + drawn[c] + 0.5
             value = value if value > 0.0 else 0.0
-            out[r0 + r, c0 + c] = np.uint8(value if value < 255.0 else 255.0)
+            row[c] = np.uint8(value if value < 255.0 else 255.0)
 
 
-@kernel
+@uncounted
 def develop_flat(
     out: np.ndarray, r0: int, c0: int, grey: np.ndarray, w: int, h: int, u0: int, v0: int, stream: np.uint64,
     hashes: np.ndarray,
@@ -85,8 +86,9 @@ def develop_flat(
         for g in range((skip + w + 3) >> 2):
             hashes[g] = mix(counter)
             counter += np.uint64(0x9E3779B97F4A7C15)
+        row, drawn = out[r0 + r, c0 : c0 + w], bits[skip : skip + w]
         for c in range(w):
-            out[r0 + r, c0 + c] = grey[bits[skip + c]]
+            row[c] = grey[drawn[c]]
 
 
 @kernel

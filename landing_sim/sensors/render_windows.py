@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from landing_sim.jit import kernel
+from landing_sim.jit import kernel, uncounted
 from landing_sim.sensors.render_kernels import shade
 from landing_sim.types import Array
 
 GENEROUS = 2.0  # times as many pixels may be made where windows are joined
 
 
-@kernel
+@uncounted
 def merged(corners: np.ndarray, looked: np.ndarray, boxes: np.ndarray, member: np.ndarray) -> int:
     """Join what is looked at of windows that overlap, so that what they share is shaded once.
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from landing_sim.geometry.runway_image import HORIZON, LEFT, THRESHOLD
-from landing_sim.jit import kernel
+from landing_sim.jit import kernel, uncounted
 from landing_sim.types import Array
 from landing_sim.vision.layout import (
     BLUR,
@@ -39,7 +39,7 @@ _OPPOSITE = 1.5  # [px] between what a border's mask looks at and the other bord
 _SHARE, _SHARE_NEAR = 0.4, 0.12  # of a mask's length on paint: within the search range, and within the mask's profile
 
 
-@kernel
+@uncounted
 def _footprint(
     view: View, side: int, u: float, v: float, su: float, sv: float, au: float, av: float, half: int, reach: float
 ) -> tuple[float, float, float]:
@@ -58,7 +58,7 @@ def _footprint(
     return s0, s1, 0.5 * view.width - depth
 
 
-@kernel
+@uncounted
 def _blocked(rows: Array, side: int, s0: float, s1: float, y: float) -> bool:
     """Whether a footprint meets one of the rows x0, x1, Feature, |y|: it reaches inwards to |y| = `y`."""
     for k in range(len(rows)):  # noqa: SIM110 a generator cannot be compiled
@@ -67,7 +67,7 @@ def _blocked(rows: Array, side: int, s0: float, s1: float, y: float) -> bool:
     return False
 
 
-@kernel
+@uncounted
 def _covered(rows: Array, side: int, s0: float, s1: float, y: float) -> float:
     """Share of a footprint's length that meets such rows."""
     length = 0.0
@@ -77,7 +77,7 @@ def _covered(rows: Array, side: int, s0: float, s1: float, y: float) -> float:
     return length / max(1e-9, s1 - s0)
 
 
-@kernel
+@uncounted
 def _inset(
     line: Array, sigma: float, h: int, su: float, sv: float, au: float, av: float, d_u: float, d_v: float
 ) -> float:

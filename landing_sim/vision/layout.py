@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from landing_sim.jit import kernel
+from landing_sim.jit import kernel, uncounted
 from landing_sim.types import Array
 from landing_sim.vision.prediction import NEAR, View
 
@@ -30,7 +30,7 @@ _SHEAR = 3.0  # a threshold window's path follows the runway's image up to this 
 _BEYOND = 60.0  # [m] how far past the runway's end its graded strip goes on: ICAO Annex 14, 3.4
 
 
-@kernel
+@uncounted
 def path(l: Array, du: float, dv: float) -> tuple[float, float, float, float, float]:
     """Step, along and normal advance of a window on the unit line l that searches along (du, dv), l . (du, dv) > 0.
 
@@ -45,13 +45,13 @@ def path(l: Array, du: float, dv: float) -> tuple[float, float, float, float, fl
     return su, sv, au, av, l[0] * su + l[1] * sv
 
 
-@kernel
+@uncounted
 def search_range(rule: Array, sigma: float, advance: float) -> float:
     """Search half-width [steps]."""
     return min(rule[SEARCH_MAX], max(rule[SEARCH_MIN], math.ceil(rule[SIGMAS] * sigma / advance)))
 
 
-@kernel
+@uncounted
 def on_line(l: Array, u: float, v: float) -> tuple[float, float]:
     """The point of l near (u, v) that is whole along the edge, so that nothing is interpolated there."""
     if abs(l[1]) >= abs(l[0]):
@@ -61,7 +61,7 @@ def on_line(l: Array, u: float, v: float) -> tuple[float, float]:
     return -(l[1] * v + l[2]) / l[0], v
 
 
-@kernel
+@uncounted
 def put(
     F: Array, I: np.ndarray, at: int, u: float, v: float, su: float, sv: float, au: float, av: float, advance: float,
     half: int, search: float, arm: int,
@@ -85,7 +85,7 @@ def breadth(view: View) -> float:
     return max(abs(q_b[0] / q_b[2] - q_a[0] / q_a[2]), abs(q_b[1] / q_b[2] - q_a[1] / q_a[2]))
 
 
-@kernel
+@uncounted
 def horizon_hidden(view: View) -> bool:
     """Whether the horizon is: by a runway that rises, from who is lower than its far end."""
     return view.slope > 0.0 and -view.p_RC[2] < (view.length + _BEYOND) * math.tan(view.slope)

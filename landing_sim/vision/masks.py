@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from landing_sim.jit import kernel
+from landing_sim.jit import kernel, uncounted
 from landing_sim.types import Array
 from landing_sim.vision.layout import (
     ALONG,
@@ -99,7 +99,7 @@ def _edge_at(raw: float, blur: float, arm: int) -> tuple[float, float]:
     return d, gain
 
 
-@kernel
+@uncounted
 def profile(
     image: np.ndarray, u: float, v: float, du: float, dv: float, au: float, av: float, half: int, reach: int, P: Array
 ) -> tuple[float, float]:

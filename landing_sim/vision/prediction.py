@@ -13,7 +13,7 @@ import numpy as np
 from landing_sim.geometry.runway_edge import crossing, turning_axes
 from landing_sim.geometry.runway_image import HORIZON, LEFT, RIGHT, THRESHOLD, Vector, displacement, line_of, plane
 from landing_sim.geometry.so3 import camera_from_body, from_euler
-from landing_sim.jit import kernel
+from landing_sim.jit import kernel, uncounted
 from landing_sim.types import Array
 
 SIGHT = ("x", "y", "H", "phi", "theta", "psi", "pan", "tilt", "W")
@@ -84,7 +84,7 @@ def sight_from(
     return sight, spread, math.isfinite(sight.sum())
 
 
-@kernel
+@uncounted
 def feature_line(
     feature: int, p_RC: Array, R_CR: Array, lens: Array, width: float, slope: float, u: float, v: float
 ) -> Vector:
@@ -96,12 +96,12 @@ def feature_line(
     return line_of(plane(feature, p_RC, width, slope, azimuth), R_CR, lens[0], lens[1], lens[2])
 
 
-@kernel
+@uncounted
 def dot(l: Array, q: Array) -> float:
     return l[0] * q[0] + l[1] * q[1] + l[2] * q[2]
 
 
-@kernel
+@uncounted
 def oriented(l: Vector, q: Array, out: Array) -> None:
     """`out` (3,) = l scaled to a unit normal, positive on the side of the homogeneous point or direction q."""
     norm = max(math.hypot(l[0], l[1]), 1e-12 * abs(l[2]), 1e-300)  # no direction: seen from its own plane, end on
@@ -195,7 +195,7 @@ def cut(a: float, b: float, lo: float, hi: float) -> tuple[float, float]:
     return 1.0, 0.0
 
 
-@kernel
+@uncounted
 def in_image(q0: Array, qd: Array, lo: float, hi: float, mu: float, mv: float, frame: Array) -> tuple[float, float]:
     """The part of lo..hi for which the point q0 + qd s is in front and inside the margins mu, mv [px]. No divide."""
     lo, hi = cut(q0[2] - NEAR, qd[2], lo, hi)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from landing_sim.jit import kernel
+from landing_sim.jit import kernel, uncounted
 from landing_sim.noise import NoiseStream
 from landing_sim.types import Array
 
@@ -87,7 +87,7 @@ def _along(omega: Array, sigma: float, L: float, airspeed: float) -> Array:
     return 2.0 * sigma**2 * L / (math.pi * airspeed) / (1.0 + (L * omega / airspeed) ** 2)
 
 
-@kernel
+@uncounted
 def _transverse(state: Array, at: int, r: float, n1: float, n2: float) -> float:
     """Advance xi1, xi2 = state[at : at + 2] over r = V dt / L; return the unit-variance v or w.
 
@@ -109,7 +109,7 @@ def _transverse(state: Array, at: int, r: float, n1: float, n2: float) -> float:
     return (_SQRT3 * state[at] + (1.0 - _SQRT3) * state[at + 1]) / math.sqrt(2.0)
 
 
-@kernel
+@uncounted
 def _advance(
     state: Array, normals: Array, at: int, distance: float, height: float, w20: float
 ) -> tuple[float, float, float]:
