@@ -59,9 +59,11 @@ def _aircraft(name: str, f: Mapping[str, Any]) -> Iterator[str]:
 
 def _baseline(b: Mapping[str, Any]) -> Iterator[str]:
     yield f"  beside the afternoon's baseline, {b['frames']}, {b['cycles']} cycles     theirs     ours   ratio"
-    for name in ("range", "height", "lateral"):
-        theirs, ours = b[f"{name}_rms_m"], b[f"our_{name}_rms_m"]
-        yield f"    {name + ' RMS, on our frames [m]':44s} {theirs:8.3f} {ours:8.3f} {b[f'{name}_ratio']:7.1f}"
+    for place in ("", "camera_"):
+        for name in (f"{place}range", f"{place}height", f"{place}lateral"):
+            theirs, ours = b[f"{name}_rms_m"], b[f"our_{name}_rms_m"]
+            label = name.replace("_", "'s ") + " RMS, on our frames [m]"
+            yield f"    {label:44s} {theirs:8.3f} {ours:8.3f} {b[f'{name}_ratio']:7.1f}"
     for name in ("range", "height", "lateral"):
         theirs, ours = b[f"own_frames_{name}_rms_m"], b[f"our_{name}_rms_m"]
         yield f"    {name + ' RMS, on its own [m]':44s} {theirs:8.3f} {ours:8.3f} {b[f'own_frames_{name}_ratio']:7.1f}"
