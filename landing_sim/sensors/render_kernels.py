@@ -17,9 +17,9 @@ import math
 
 import numpy as np
 
-from landing_sim.jit import kernel, uncounted
+from landing_sim.jit import uncounted
 from landing_sim.sensors.render_lines import CUT, TABLE_HALF, TABLE_SIZE, fill_corners
-from landing_sim.sensors.render_noise import develop, develop_flat, stream_of
+from landing_sim.sensors.render_noise import develop, develop_flat
 from landing_sim.types import Array
 
 SLACK = 1e-6  # table units: covers rounding when a whole block is classified at once
@@ -198,47 +198,26 @@ def _draw_quad(
             start, stop = inside_hi, hi
 
 
-@kernel
+@uncounted
 def shade(
     out: np.ndarray, corners: np.ndarray, w: int, h: int, looked: np.ndarray, whole: bool,
     lines: Array, seen: np.ndarray, counts: np.ndarray, horizon: Array, camera: Array, palette: Array, lens: Array,
-    table: Array, quantiles: np.ndarray, greys: np.ndarray, key: np.uint64, index: int,
-) -> bool:  # fmt: skip
+    table: Array, quantiles: np.ndarray, greys: np.ndarray, stream: np.uint64,
+    block: Array, total: Array, noise: Array, hashes: np.ndarray, lists: np.ndarray, heads: np.ndarray,
+) -> None:  # fmt: skip
     """Blocks of w x h pixels with their top-left pixels at corners (n, 2) [u0, v0], as uint8.
 
     whole: `out` is the frame (height, width), and each block goes to its place, less what sticks out of the frame.
-    Otherwise `out` (n h, w) takes the blocks one below the other; False, and nothing done, if one leaves the frame.
+    Otherwise `out` (n h, w) takes the blocks one below the other; none leaves the frame.
     looked (n, 4), if not empty: first and behind the last column and row of each block that are made, and no others.
-    greys: the palette as `developed`, for blocks without an edge.
+    greys: the palette as `developed`, for blocks without an edge; stream: see `stream_of`.
+    Working space: block and total (h, w), noise (w + 6,), hashes ((w + 6) // 4,), and for the k sub-exposures with up to
+    m quadrilaterals lists (2, k, m) and heads (2, k).
 
     A frame is the mean over its sub-exposures (first axis of lines, seen, counts, horizon), then lens and noise.
     """
-    width, height = int(camera[3]), int(camera[4])
-    if not whole:
-        for i in range(corners.shape[0]):
-            u0, v0 = corners[i, 0], corners[i, 1]
-            if u0 < 0 or v0 < 0 or u0 + w > width or v0 + h > height:
-                return False
-    active, edges = np.empty(seen.shape[:2], np.int64), np.empty(seen.shape[:2], np.int64)
-    base, first = np.empty(len(counts), np.int64), np.empty(len(counts), np.int64)
-    block, total, noise, hashes = np.empty((h, w)), np.empty((h, w)), np.empty(w + 6), np.empty((w + 6) >> 2, np.uint64)
-    _shade(
-        out, corners, w, h, looked, whole, lines, seen, counts, horizon, camera, palette, lens, table, quantiles, greys,
-        stream_of(key, index), active, edges, base, first, block, total, noise, hashes,
-    )  # fmt: skip
-    return True
-
-
-@uncounted
-def _shade(
-    out: np.ndarray, corners: np.ndarray, w: int, h: int, looked: np.ndarray, whole: bool,
-    lines: Array, seen: np.ndarray, counts: np.ndarray, horizon: Array, camera: Array, palette: Array, lens: Array,
-    table: Array, quantiles: np.ndarray, greys: np.ndarray, stream: np.uint64,
-    active: np.ndarray, edges: np.ndarray, base: np.ndarray, first: np.ndarray,
-    block: Array, total: Array, noise: Array, hashes: np.ndarray,
-) -> None:  # fmt: skip
-    """`shade` with its working space: from `active` on, as it is made there."""
     width, height, subs = int(camera[3]), int(camera[4]), len(counts)
+    active, edges, base, first = lists[0], lists[1], heads[0], heads[1]
     for i in range(corners.shape[0]):
         u0, v0 = corners[i, 0], corners[i, 1]
         r0, c0 = (v0, u0) if whole else (i * h, 0)

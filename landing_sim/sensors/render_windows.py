@@ -9,6 +9,7 @@ import numpy as np
 
 from landing_sim.jit import kernel, uncounted
 from landing_sim.sensors.render_kernels import shade
+from landing_sim.sensors.render_noise import stream_of
 from landing_sim.types import Array
 
 GENEROUS = 2.0  # times as many pixels may be made where windows are joined
@@ -55,13 +56,16 @@ def shade_windows(
     lines: Array, seen: np.ndarray, counts: np.ndarray, horizon: Array, camera: Array, palette: Array, lens: Array,
     table: Array, quantiles: np.ndarray, greys: np.ndarray, key: np.uint64, index: int,
 ) -> bool:  # fmt: skip
-    """`shade`, what windows share of their `looked` shaded once: the same pixels."""
+    """`shade`, what windows share of their `looked` shaded once: the same pixels.
+
+    key: of the pixel noise, index: the frame's number. False, and nothing done, if a window leaves the frame.
+    """
     n = m = len(corners)
+    for i in range(0 if whole else n):
+        if min(corners[i, 0], corners[i, 1]) < 0 or corners[i, 0] + w > camera[3] or corners[i, 1] + h > camera[4]:
+            return False
     boxes, member = np.empty((n, 4), np.int64), np.empty(n, np.int64)
     if len(looked) > 0:
-        for i in range(n):
-            if min(corners[i, 0], corners[i, 1]) < 0 or corners[i, 0] + w > camera[3] or corners[i, 1] + h > camera[4]:
-                return False
         m = merged(corners, looked, boxes, member)
     made, tops, parts, size = out, corners, looked, np.array([w, h])
     if m < n:
@@ -77,12 +81,15 @@ def shade_windows(
                 tops[k, c] -= parts[k, c]
                 parts[k, 2 + c] += parts[k, c]
         made = np.empty((m * size[1], size[0]), np.uint8)
-    inside = shade(  # called in one place: each would be a copy to compile
+    room = size[1], size[0]
+    lists, heads = np.empty((2, seen.shape[0], seen.shape[1]), np.int64), np.empty((2, len(counts)), np.int64)
+    shade(  # called in one place: each would be a copy to compile
         made, tops, size[0], size[1], parts, whole, lines, seen, counts, horizon, camera, palette, lens, table, quantiles,
-        greys, key, index,
+        greys, stream_of(key, index), np.empty(room), np.empty(room), np.empty(size[0] + 6),
+        np.empty((size[0] + 6) >> 2, np.uint64), lists, heads,
     )  # fmt: skip
     if m == n:
-        return inside
+        return True
     for i in range(n):
         k = member[i]
         left, top = corners[i, 0] - tops[k, 0], corners[i, 1] - tops[k, 1] + k * size[1]
