@@ -103,8 +103,8 @@ def _beyond(x: float, table: Array) -> float:
         return 1.0
     if x >= TABLE_SIZE:
         return 0.0
-    i = int(x)
-    return table[i] + (x - i) * (table[i + 1] - table[i])
+    i = np.uint32(x)  # an index that may be negative is asked whether it is
+    return table[i, 0] + (x - i) * table[i, 1]  # type: ignore[no-any-return]
 
 
 @uncounted

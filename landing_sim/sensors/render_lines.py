@@ -25,11 +25,12 @@ CULL_MARGIN = 64.0  # [px] around the image outside which a quadrilateral is dro
 
 
 def edge_table() -> Array:
-    """(TABLE_SIZE + 1,) fraction of a blurred half-plane that lies beyond its edge: 1 at -CUT sigma .. 0 at +CUT."""
+    """(TABLE_SIZE + 1, 2) fraction of a blurred half-plane that lies beyond its edge, 1 at -CUT sigma .. 0 at +CUT, and
+    the step from there to the next."""
     x = np.linspace(-CUT, CUT, TABLE_SIZE + 1)
     table = np.array([0.5 * math.erfc(v / math.sqrt(2.0)) for v in x])
     table[0], table[-1] = 1.0, 0.0
-    return table
+    return np.column_stack([table, np.diff(table, append=0.0)])
 
 
 @kernel
