@@ -1,7 +1,8 @@
 """Compiled kernels: one decorator, so that caching and floating-point rules are the same everywhere.
 
 `fastmath` stays off: reassociated sums would make results depend on the processor. Division by zero gives inf or nan, as in
-numpy: checks in every division are not paid for.
+numpy: checks in every division are not paid for. An index that may be negative, for all numba knows, is looked at in every
+access: loops over pixels take their row first, and count in it from zero.
 """
 
 from __future__ import annotations
@@ -11,7 +12,9 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
-from numba.core import event
+from numba.core import config, event
+
+from landing_sim.jit_cache import LOCATORS
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -41,7 +44,7 @@ event.register("numba:compile", _Uncollected())
 
 def kernel(function: F) -> F:
     """Compile `function` with numba, cached on disk."""
-    return numba.njit(cache=True, fastmath=False, error_model="numpy", no_cfunc_wrapper=True)(function)  # type: ignore[no-any-return]
+    return _compiled(function, counted=True)
 
 
 def uncounted(function: F) -> F:
@@ -50,7 +53,16 @@ def uncounted(function: F) -> F:
     Each count is an atomic operation, and numba counts at every call of a small kernel and at every row taken of an array:
     a sixth of all time in kernels. numba itself refuses to compile one that makes an array, or calls a kernel that does.
     """
-    return numba.njit(cache=True, fastmath=False, error_model="numpy", no_cfunc_wrapper=True, _nrt=False)(function)  # type: ignore[no-any-return]
+    return _compiled(function, counted=False)
+
+
+def _compiled(function: F, counted: bool) -> F:
+    before, config.CACHE_LOCATOR_CLASSES = config.CACHE_LOCATOR_CLASSES, LOCATORS
+    try:
+        options = {} if counted else {"_nrt": False}
+        return numba.njit(cache=True, fastmath=False, error_model="numpy", no_cfunc_wrapper=True, **options)(function)  # type: ignore[no-any-return]
+    finally:
+        config.CACHE_LOCATOR_CLASSES = before
 
 
 def direct(compiled: Callable[..., Any]) -> Callable[..., Any]:
