@@ -37,12 +37,13 @@ def edge_model(
     p_RC, arm = np.empty(3), turned(R_RB, lever[0], lever[1], lever[2])
     p_RC[0], p_RC[1], p_RC[2] = arm[0] + x[X], arm[1] + x[Y], arm[2] - x[H]
     axes, J = turning_axes(x[PHI], x[THETA], true_pan), np.empty((1, 9))
+    row: int = np.int64(0)  # type: ignore[assignment]  # numba compiles a constant for itself
     for i in range(Hx.shape[0]):
         for k in range(Hx.shape[1]):
             Hx[i, k] = 0.0
         h[i] = crossing(
             feature[i], centre[i, 0], centre[i, 1], direction[i, 0], direction[i, 1], p_RC, R_CR, R_RB, axes, lever, focal,
-            x[WIDTH], slope, J, 0,
+            x[WIDTH], slope, J, row,
         )  # fmt: skip
         for k in range(3):
             Hx[i, X + k], Hx[i, PHI + k] = J[0, k], J[0, BY_PHI + k]
