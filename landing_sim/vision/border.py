@@ -30,7 +30,7 @@ from landing_sim.vision.layout import (
     search_range,
 )
 from landing_sim.vision.masks import REACH
-from landing_sim.vision.prediction import View, cut, dot, in_image
+from landing_sim.vision.prediction import View, cut, dot, in_image, point
 
 _CLEARANCE = 2.0  # [px] between a mask and another edge
 _PLACES = 17  # places tried around each regular one, 1/32 of the line apart
@@ -118,7 +118,7 @@ def place_border(
     wanted = search_range(rule, sigma[side], advance)
     mu = (wanted + REACH) * abs(su) + half * abs(au) + 2.0
     mv = (wanted + REACH) * abs(sv) + half * abs(av) + 2.0
-    q0, qd = view.threshold + (side - 0.5) * view.width * view.across, view.along
+    q0, qd = point(view.threshold, view.across, (side - 0.5) * view.width), view.along
     lo, hi = in_image(q0, qd, 0.0, length, mu, mv, view.frame)
     if lo >= hi:
         return
@@ -132,7 +132,7 @@ def place_border(
         lo, hi = cut(-dot(sky, q0) - apart * q0[2], -dot(sky, qd) - apart * qd[2], lo, hi)
     if lo >= hi:
         return
-    q_a, q_b = q0 + lo * qd, q0 + hi * qd
+    q_a, q_b = point(q0, qd, lo), point(q0, qd, hi)
     a_u, a_v = q_a[0] / q_a[2], q_a[1] / q_a[2]
     d_u, d_v = q_b[0] / q_b[2] - a_u, q_b[1] / q_b[2] - a_v
     t0 = t1 = span = 0.0

@@ -12,7 +12,7 @@ import numpy as np
 
 from landing_sim.jit import kernel, uncounted
 from landing_sim.types import Array
-from landing_sim.vision.prediction import NEAR, View
+from landing_sim.vision.prediction import NEAR, View, point
 
 # columns of F; the first five take two
 CENTRE, DIRECTION, STEP, ALONG, ORIGIN, NORMAL_STEP, OFFSET = 0, 2, 4, 6, 8, 10, 11
@@ -78,8 +78,8 @@ def put(
 @kernel
 def breadth(view: View) -> float:
     """[px] from corner to corner of the threshold, along the pixel axis nearer to it; 0 if one is behind the camera."""
-    q_a = view.threshold - 0.5 * view.width * view.across
-    q_b = view.threshold + 0.5 * view.width * view.across
+    q_a = point(view.threshold, view.across, -0.5 * view.width)
+    q_b = point(view.threshold, view.across, 0.5 * view.width)
     if q_a[2] < NEAR or q_b[2] < NEAR:
         return 0.0
     return max(abs(q_b[0] / q_b[2] - q_a[0] / q_a[2]), abs(q_b[1] / q_b[2] - q_a[1] / q_a[2]))

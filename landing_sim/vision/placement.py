@@ -45,7 +45,7 @@ from landing_sim.vision.layout import (
     search_range,
 )
 from landing_sim.vision.masks import REACH
-from landing_sim.vision.prediction import WIDTH, View, dot, feature_line, in_image, look, oriented, spread
+from landing_sim.vision.prediction import WIDTH, View, dot, feature_line, in_image, look, oriented, point, spread
 from landing_sim.vision.threshold import in_metres, place_threshold
 
 
@@ -76,7 +76,7 @@ def _place_horizon(F: Array, I: np.ndarray, at: int, n: int, view: View, sigma: 
             t = wish + (k // 2 + k % 2) * (1.0 if k % 2 else -1.0) / 32.0
             if t < 0.0 or t > 1.0:
                 continue
-            q = h0 + (lo + t * (hi - lo)) * hd
+            q = point(h0, hd, lo + t * (hi - lo))
             u, v = q[0], q[1]
             q[0] -= below * sky[0]
             q[1] -= below * sky[1]

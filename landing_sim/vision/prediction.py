@@ -120,6 +120,15 @@ def _image_of(x: float, y: float, z: float, R: Array, lens: Array) -> Array:
 
 
 @kernel
+def point(q: Array, way: Array, s: float) -> Array:
+    """The homogeneous point q + s way; by a loop, for numba takes longer to compile a sum of arrays."""
+    out = np.empty(3)
+    for i in range(3):
+        out[i] = q[i] + s * way[i]
+    return out
+
+
+@kernel
 def _inverse(a: Array, b: Array, c: Array) -> Array:
     """Inverse, up to scale, of the matrix with the columns a, b, c."""
     out = np.empty((3, 3))
@@ -222,12 +231,12 @@ def spread(view: View, sight: Array, cov: Array, lever: Array, extra: float) -> 
         u, v = view.lens[1] + (which - 0.5) * 0.8 * view.frame[0], view.lens[2]
         q = np.zeros(3)
         if side in (LEFT, RIGHT):
-            q0 = view.threshold + (side - 0.5) * view.width * view.across
+            q0 = point(view.threshold, view.across, (side - 0.5) * view.width)
             lo, hi = in_image(q0, view.along, 0.0, view.length, 0.0, 0.0, view.frame)
             if lo < hi:
-                q = q0 + (lo if which == 0 else hi) * view.along
+                q = point(q0, view.along, lo if which == 0 else hi)
         elif side == THRESHOLD:
-            q = view.threshold + (which - 0.5) * view.width * view.across
+            q = point(view.threshold, view.across, (which - 0.5) * view.width)
         if q[2] >= 0.5 * NEAR:
             u, v = q[0] / q[2], q[1] / q[2]
         crossing(

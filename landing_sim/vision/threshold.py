@@ -30,7 +30,7 @@ from landing_sim.vision.layout import (
     search_range,
 )
 from landing_sim.vision.masks import REACH, pulled
-from landing_sim.vision.prediction import NEAR, View, dot, in_image
+from landing_sim.vision.prediction import NEAR, View, dot, in_image, point
 
 _BESIDE = 1.5  # [px] between the end of a mask and paint beside it: there, room is short
 _NARROW = 3.5  # [px] strips free of paint are no use below: what is beside them is blurred into all of their width
@@ -95,7 +95,7 @@ def place_threshold(
     if not resolved:
         side = 0.5 * view.width * (1.0 - blurred / max(wide, blurred))
         strips, blurred = np.array([[-side, 0.0], [0.0, side]]), 0.0
-        begin, end = q + runway[START] * qd, q + (runway[START] + runway[STRIPES]) * qd
+        begin, end = point(q, qd, runway[START]), point(q, qd, runway[START] + runway[STRIPES])
         pull = pulled(
             dot(row, begin) / (begin[2] * advance), dot(row, end) / (end[2] * advance), runway[BRIGHTER],
             rule[BLUR] / advance,
@@ -105,7 +105,7 @@ def place_threshold(
     for attempt in range(2):  # far off and from the side no strip has room for the full distance: then half of it
         n_usable = 0
         for k in range(n_strips):
-            q_a, q_b = q + strips[k, 0] * view.across, q + strips[k, 1] * view.across
+            q_a, q_b = point(q, view.across, strips[k, 0]), point(q, view.across, strips[k, 1])
             if q_a[2] < NEAR or q_b[2] < NEAR:
                 continue
             e = ends[n_usable]
