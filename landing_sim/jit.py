@@ -48,10 +48,11 @@ def kernel(function: F) -> F:
 
 
 def uncounted(function: F) -> F:
-    """`kernel` for what neither makes an array nor returns one: it does not count references to those it is given.
+    """`kernel` for what neither makes nor returns an array, nor calls a kernel that returns one: it counts no references.
 
     Each count is an atomic operation, and numba counts at every call of a small kernel and at every row taken of an array:
-    a sixth of all time in kernels. numba itself refuses to compile one that makes an array, or calls a kernel that does.
+    a sixth of all time in kernels. numba itself refuses one that makes an array. What a kernel returned to it would never
+    be freed, and what it returned itself might be freed too soon: numba says nothing of either, a test does.
     """
     return _compiled(function, counted=False)
 
