@@ -58,7 +58,8 @@ def uncounted(function: F) -> F:
 
 
 def _compiled(function: F, counted: bool) -> F:
-    before, config.CACHE_LOCATOR_CLASSES = config.CACHE_LOCATOR_CLASSES, LOCATORS
+    before = config.CACHE_LOCATOR_CLASSES  # the process's other kernels are none of our business
+    config.CACHE_LOCATOR_CLASSES = before or LOCATORS
     try:
         options = {} if counted else {"_nrt": False}
         return numba.njit(cache=True, fastmath=False, error_model="numpy", no_cfunc_wrapper=True, **options)(function)  # type: ignore[no-any-return]

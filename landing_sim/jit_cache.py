@@ -4,7 +4,7 @@ numba looks at the file a kernel stands in. But a kernel has swallowed those it 
 change of theirs would go unnoticed until its own file is touched. Here the stamp is of all modules of this package that its
 file imports, and that these import.
 
-Source     numba 0.68, `numba.core.caching`; its documentation names the limit ("functions defined in other files").
+Source     numba 0.68, `numba.core.caching`; its notes on caching name the limit: symbols that another file defines.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ def sources(file: Path) -> frozenset[Path]:
     return frozenset(known)
 
 
+@cache
 def stamp(file: Path) -> str:
     """Differs when one of `sources` does."""
     whole = hashlib.sha256()
@@ -69,5 +70,6 @@ class AtHome(_Followed, caching.UserWideCacheLocator):  # type: ignore[misc]
     """In the user's own cache, where that cannot be written to."""
 
 
-LOCATORS = ",".join(f"{__name__}.{locator.__name__}" for locator in (Wanted, Beside, AtHome))
-"""As numba's CACHE_LOCATOR_CLASSES wants them."""
+_OURS = (f"{__name__}.{locator.__name__}" for locator in (Wanted, Beside, AtHome))
+LOCATORS = ",".join([*_OURS, "IPythonCacheLocator", "ZipCacheLocator"])
+"""As numba's CACHE_LOCATOR_CLASSES wants them; its own for what stands in no file, such as a kernel in a notebook."""

@@ -103,7 +103,7 @@ def _beyond(x: float, table: Array) -> float:
         return 1.0
     if x >= TABLE_SIZE:
         return 0.0
-    i = np.uint32(x)  # an index that may be negative is asked whether it is
+    i = np.uint32(x)  # unsigned: see `jit` on indices
     return table[i, 0] + (x - i) * table[i, 1]  # type: ignore[no-any-return]
 
 
